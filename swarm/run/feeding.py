@@ -1,4 +1,4 @@
-"""The births of balls while a run lasts: which are due, which find a free place, and which wait for one."""
+"""The births of balls during a run: which are due, which find a free place, and which wait for one."""
 
 import math
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from ..sources.ball_places import ball_places
 from ..sources.places import changes
 from ..state import Floats, State
 
-# So many places are tried for a birth at a time.
+# The number of places that are tried for a birth at one time.
 _TRIES = 16
 # Balls that are born are at least this part of the sum of their radii apart, more than the round-off of it.
 _APART = 1.0 + 1e-12
@@ -39,13 +39,13 @@ class Newborn(NamedTuple):
 class Feed:
     """The births of the balls of a run.
 
-    All that is random of them is drawn from the seed by the number of the birth, or of the try, so that the births have
-    the same bits for any threads, and the same run has the same births.
+    Random numbers are drawn from the seed by the number of the birth, or of the try, so that births have the same bits
+    for any number of threads.
 
     Args:
         scene: the vessel.
-        particles: those of the start, and behind them those that may come.
-        seed: of the run.
+        particles: those of the start, followed by those that may come.
+        seed: the seed of the run.
         is_clear: whether a place (3,) is clear of the walls that impacts move, for a radius [m] at a time [s].
 
     Attributes:
@@ -63,15 +63,15 @@ class Feed:
         n, sources = len(particles), births.sources
         self.born_time = np.where(births.source < 0, 0.0, np.nan)
         self._due = [np.flatnonzero(births.source == k) for k in range(sources)]
-        # How many births of each source are over, and how many places were tried; those that found none at once; and
-        # when the next may be tried at the earliest [s].
+        # For each source: the births that are over, the places that were tried, the births that found no free place at
+        # their time, and when the next one may be tried at the earliest [s].
         self._over, self._tried, self._blocked = np.zeros((3, sources), np.int64)
         self._earliest, self._counted = np.zeros(sources), np.full(sources, -1)
         self._energy = np.zeros(n)
         self._changing = [i for i, one in enumerate(scene.surfaces) if changes(one) and not one.reacts()]
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """What a run that goes on needs, for `BaseRun.arrays`."""
+        """The arrays of a checkpoint, for `BaseRun.arrays`."""
         own = {"over": self._over, "tried": self._tried, "blocked": self._blocked, "earliest": self._earliest}
         own |= {"counted": self._counted, "energy": self._energy, "born_time": self.born_time}
         return {f"feed.{name}": array for name, array in own.items()}
@@ -102,7 +102,7 @@ class Feed:
         return max(float(self._births.time[self._due[k][self._over[k]]]), float(self._earliest[k]))
 
     def come(self, now: float, there: There, slack: float = 0.0) -> Newborn:
-        """The births at an instant [s], also of what is due so little later, beside the balls that are there."""
+        """The births at an instant [s], and those due within `slack` [s] after it, beside the balls that are there."""
         made: list[tuple[int, Floats, Floats]] = []
         for k in range(self._births.sources):
             self._come_from(k, (now, now + slack), there, made)
@@ -151,7 +151,7 @@ class Feed:
         return None
 
     def _beside(self, there: There, made: list[tuple[int, Floats, Floats]]) -> There:
-        """What is there with those that were `made` at this instant; their velocities are not asked for."""
+        """The balls that are there, and those that were `made` at this instant, without the velocities of these."""
         radius = self._particles.radius
         assert radius is not None
         position = np.concatenate([there.position, *(r[:, None] for _n, r, _v in made)], axis=1)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 # ETA and speed come from the last seconds only: compile time would spoil an average from the start.
 _WINDOW = 10.0
-# Seconds from one look at a frame to the next, and how many seconds a frame takes that hardly goes on: a month.
+# Seconds between two looks at a frame; a frame that would take longer than the second time [s] hardly goes on.
 LOOK, _A_MONTH = 10.0, 30 * 86400.0
 _LOG = logging.getLogger("swarm")
 # Seconds from one plain line to the next, and from one change of the bar to the next within a long frame.
@@ -20,7 +20,7 @@ _A_MINUTE, _A_MOMENT = 60.0, 1.0
 
 
 def _nothing(*_args: Any) -> None:
-    """Shows nothing."""
+    """Show nothing."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def lines(interval: float) -> Display:
 
 
 def _of_run(one: ProgressListener, every: float) -> Display:
-    """A display of the share that is done, and of a line about the last seconds."""
+    """The display of a run, which shows the share that is done and a line about the last seconds."""
     recent = _Recent()
 
     def frame(done: Any) -> None:
@@ -130,7 +130,7 @@ class _Recent:
         self._energy = ""
 
     def frame(self, frame: Any) -> str:
-        """Time, ETA, speed and energy error after this frame."""
+        """The line after this frame: time, ETA, speed and energy error."""
         self._energy = f"  energy error {frame.observables['energy_error']:.1e}"
         if frame.number == 0:
             return ""
@@ -138,7 +138,7 @@ class _Recent:
         return self.within(frame.time, frame.until)
 
     def within(self, moment: float, until: float) -> str:
-        """The same within a frame, with speed and energy error of the last one."""
+        """The line within a frame, with the speed and the energy error of the last one."""
         self._moments.note(moment)
         elapsed, impacts = self._impacts.lately()
         speed = f"  {impacts / elapsed:.3g} impacts/s" if elapsed > 0.0 else ""
@@ -146,7 +146,7 @@ class _Recent:
 
 
 class Standstill:
-    """Warns once of a run with a frame that hardly goes on."""
+    """A warning, once in a run, of a frame that hardly goes on."""
 
     def __init__(self) -> None:
         self._shares, self._about, self._has_warned, self._is_slow = Pace(LOOK), (0, 0.0), False, False
@@ -154,8 +154,8 @@ class Standstill:
     def look(self, number: int, share: float, behind: tuple[int, list[float]] | None, compiled: float) -> None:
         """Look at a frame, of which this share is done.
 
-        `behind` is the last particle, and where it is [m]; `compiled` is for how long kernels were compiled so far [s],
-        in which a frame does not go on.
+        `behind` is (the particle with the most time left, its place [m]); `compiled` is the time of compilations so far
+        [s], during which a frame does not advance.
         """
         if (number, compiled) != self._about:
             self._shares, self._about, self._is_slow = Pace(LOOK), (number, compiled), False
@@ -195,7 +195,7 @@ class Pace:
             self._values.popleft()
 
     def lately(self) -> tuple[float, float]:
-        """Seconds and difference from the first value to the last."""
+        """(seconds, difference) from the first value to the last."""
         if not self._values:
             return 0.0, 0.0
         (began, before), (now, value) = self._values[0], self._values[-1]

@@ -14,16 +14,16 @@ from ..state import Contacts, Floats, Multipliers, State, none_left
 
 
 class Seeding(NamedTuple):
-    """The source of random numbers besides the impacts: the seed, and the number of the first particle of this run.
+    """What random numbers depend on besides the impact: the seed, and the number of the first particle of this run.
 
-    That is 0 but for a shard: its particles are numbered as in the whole run.
+    The number is 0 except in a shard, where particles are numbered as in the whole run.
     """
 
     seed: int = 0
     first: int = 0
 
     def signed(self) -> int:
-        """The seed as kernels take it: the signed number of the same 64 bits."""
+        """The seed for kernels: the signed integer with the same 64 bits."""
         return self.seed - 2**64 if self.seed >= 2**63 else self.seed
 
 
@@ -33,9 +33,9 @@ UNSEEDED = Seeding()
 def state_of(
     compiled: CompiledScene, particles: Particles, method: Method, booked: int, presses: bool = False
 ) -> State:  # fmt: skip
-    """The state with the arrays of the particles and so many rows of what walls give; energies are still to be set.
+    """The state with the arrays of the particles; `start_energies` sets the energies.
 
-    It `presses` where what a wall gives is kept until a contact ends.
+    `booked` is the number of rows of impulse and work; `presses` is whether impulses are kept until a contact ends.
     """
     n, laws, rows = len(particles), compiled.laws, len(compiled.numbering.surfaces_of_rows)
     period, openings, ends = compiled.cell(), compiled.openings(), laws is not None and laws.may_end
@@ -82,7 +82,7 @@ def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], las
         phase[:] = contacts.phase[: len(phase)]
         rests = contacts.phase == ARRIVED
         if rests.any():
-            # What is at rest costs this much.
+            # Particles at rest need no kernel.
             state.impulse[: len(contacts.load)] += contacts.load * (span * state.mass)
             contacts.sliding[:] += span * rests
     if state.escape_time is not None or state.absorbed is not None:
@@ -105,7 +105,7 @@ def _begin_late(left: Floats, remaining: Floats | None, phase: NDArray[np.int8],
 
 
 def holders_of_resting(contacts: Contacts | None) -> NDArray[np.int64]:
-    """The wall on which each particle rests that does."""
+    """The wall of each particle that rests."""
     if contacts is None:
         return np.zeros(0, np.int64)
     rests = contacts.phase == ARRIVED
@@ -116,7 +116,7 @@ def holders_of_resting(contacts: Contacts | None) -> NDArray[np.int64]:
 def have_lasted(contacts: Contacts | None, phase: NDArray[np.int8]) -> bool:
     """Whether a contact of a run has lasted, or is about to.
 
-    Not whether something is left of the frame: a particle that starts within it may have met no wall yet.
+    The time that is left of the frame does not tell: a particle that starts within it may have met no wall yet.
     """
     if contacts is None:
         return False

@@ -1,4 +1,4 @@
-"""What each member of each surface has had of a run, counted by each thread by itself: impacts, times of contact."""
+"""Counts for each member of each surface, kept by each thread: impacts, times of contact, heat."""
 
 import math
 import threading
@@ -14,7 +14,7 @@ from .impacts import Impacts
 from .options import Task
 
 Wholes = NDArray[np.int64]
-# The unit of a sum is this part of what is large in the run: each term is rounded to 2^-52 of that.
+# The unit of a sum is a large value of the run over this number: each term is rounded to 2^-52 of that unit.
 _UNITS = 4096.0
 
 
@@ -30,11 +30,11 @@ OBSERVED = {"stays": "member_residence", "heats": "member_heat"}
 
 
 class Tally:
-    """The counts of the threads of a run, and of the sessions before; sums of whole numbers, so exact in any order.
+    """The counts of the threads of a run, and of earlier sessions: sums of whole numbers, exact in any order.
 
     Args:
-        owners: of each wall of the kernels its surface, and its number in the field or of the part, or -1: (2, walls).
-        units: of the sums.
+        owners: (2, walls): the surface of each wall, and its number in the field or of the part, or -1.
+        units: the units of the sums.
     """
 
     def __init__(self, owners: Wholes, units: Units = Units()) -> None:  # noqa: B008  it cannot be changed
@@ -43,11 +43,11 @@ class Tally:
         self._counts: dict[int, Counts] = {}
 
     def size(self) -> int:
-        """Bytes of the observables of a frame."""
+        """The size of the observables of a frame [bytes]."""
         return 8 * self._members * (2 + len(self._summed()))
 
     def counts(self) -> Counts:
-        """The counts of the thread that calls."""
+        """The counts of the calling thread."""
         return self.of_thread(threading.get_ident())
 
     def of_thread(self, number: int) -> Counts:
@@ -55,7 +55,7 @@ class Tally:
         return self._counts.setdefault(number, self._none())
 
     def _summed(self) -> dict[str, float]:
-        """The sums that there are, and their units."""
+        """Name -> unit, of the sums that are kept."""
         return {name: unit for name, unit in self._units._asdict().items() if unit is not None}
 
     def _none(self) -> Counts:
@@ -63,7 +63,7 @@ class Tally:
         return Counts(np.zeros(self._walls, np.int64), **sums)
 
     def rest(self, walls: Wholes, time: float) -> None:
-        """Count a time that each of some particles rests on a wall [s]."""
+        """Count a time [s] for which a particle rests on each of these walls."""
         stays = self.counts().stays
         if stays is None or not walls.size:
             return
@@ -77,7 +77,7 @@ class Tally:
     # --- Sums of all threads -----------------------------------------------------------------------------
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """What `restore` takes."""
+        """The arrays of a checkpoint, which `restore` takes."""
         every = [*self._counts.values(), self._none()]
         found = {"member_impacts": np.sum([one.impacts for one in every], axis=0)}
         for name, unit in self._summed().items():
@@ -97,7 +97,7 @@ class Tally:
             _carry(sums.whole, sums.rest)
 
     def seen(self, absorbed: Absorbed | None = None, is_shard: bool = False) -> dict[str, NDArray[Any]]:
-        """The observables: of all members, surface by surface; of a shard the whole numbers that stand for sums."""
+        """The observables of all members, surface by surface; in a shard the sums are pairs of whole numbers."""
         arrays = self.arrays()
         found: dict[str, NDArray[Any]] = {"member_impacts": self._of_members(arrays["member_impacts"])}
         for name, unit in self._summed().items():
@@ -109,7 +109,7 @@ class Tally:
         return found
 
     def _of_members(self, of_walls: Wholes) -> Wholes:
-        """Of each member; of all its walls and images together where it is one body."""
+        """The counts of members, each summed over its walls and images."""
         total = np.zeros(self._members, np.int64)
         np.add.at(total, self._places, of_walls)
         return total
@@ -142,7 +142,7 @@ def units_of(task: Task) -> Units:
 
 
 def scales_of(task: Task) -> tuple[float, float]:
-    """The units of times and of heat of a run, which do not depend on its end: by the start, and its hottest wall.
+    """The units of times and of heat of a run, from its start and its hottest wall; they do not depend on its end.
 
     A time is large if a particle crosses the scene in it, heat if it is the energy of a particle.
     """
@@ -165,7 +165,7 @@ def _power_of_two(large: float) -> float:
 
 
 def value_of(parts: Wholes, unit: float | None) -> NDArray[np.float64]:
-    """The sums that whole numbers (2, members) stand for."""
+    """The sums [s or J] from their pairs of whole numbers (2, members)."""
     assert unit is not None
     whole, rest = parts.copy()
     _carry(whole, rest)
@@ -173,7 +173,7 @@ def value_of(parts: Wholes, unit: float | None) -> NDArray[np.float64]:
 
 
 def _places_of(owners: Wholes) -> tuple[Wholes, int]:
-    """Of each wall the place of its member among all, surface by surface; and how many there are."""
+    """(for each wall the place of its member among all members, surface by surface; the number of members)."""
     surface, member = owners[0], np.maximum(owners[1], 0)
     counts = np.zeros(int(surface.max()) + 1, np.int64)
     np.maximum.at(counts, surface, member + 1)
@@ -181,7 +181,7 @@ def _places_of(owners: Wholes) -> tuple[Wholes, int]:
 
 
 def _carry(whole: Wholes, rest: Wholes) -> None:
-    """Carry what is a unit or more."""
+    """Carry whole units from `rest` to `whole`, in place."""
     more = rest // int(PARTS)
     whole += more
     rest -= more * int(PARTS)

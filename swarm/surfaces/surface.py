@@ -72,7 +72,7 @@ class Surface(Validated):
             the wall's temperature, and not specularly.
         laws: `WallLaw`s in their order, such as `Lambert`, `Absorb`, `CercignaniLampis`, `Sticky` or user-defined laws.
             They give the velocity with which a particle leaves.
-        motion: None, `Translation`, `Oscillation`, `Rotation`, `Path` or a sum of them, from where the surface is given.
+        motion: None, `Translation`, `Oscillation`, `Rotation`, `Path` or their sum, from where the surface is given.
             The laws of the wall act on the velocity relative to it.
         mass: the mass of a wall that impacts move [kg], above 0; None: impacts do not move it. It moves without
             turning: along its `motion` if that is a `Guide`, else freely, with the velocity of a `Translation` at the

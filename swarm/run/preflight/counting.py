@@ -1,4 +1,4 @@
-"""Counters of a run: checked against its scene, and as kernels take them."""
+"""The counters of a run: their checks against the scene, and the record that kernels take."""
 
 import math
 from typing import Any
@@ -24,7 +24,7 @@ from ...surfaces.surface import Surface
 from ...surfaces.union import Union
 from ..options import RunOptions
 
-# Of the size of a scene and of a counter, a distance that is round-off: rooms that touch are three times 1e-13 apart.
+# The part of the size of a scene and of a counter that is round-off: rooms that touch are three times 1e-13 apart.
 _NEAR = 1e-12
 # The part by which a ball is larger than what is in it.
 _ROOM = 1e-9
@@ -32,7 +32,7 @@ _ROOM = 1e-9
 _MOST = 24
 # The most cells that a particle may come through in a frame: seconds.
 _MOST_CELLS = 1e7
-# Particles with sides found at a time.
+# The sides of so many particles are found at once.
 _AT_ONCE = 65_536
 
 
@@ -118,7 +118,7 @@ def _ball_around(*given: Any) -> Any:
 
 
 def _require_no_mesh(name: str, surface: Surface, verb: str) -> None:
-    """Raise a `SceneError` for exact triangles: a kernel does not know how far a place is from these."""
+    """Raise a `SceneError` for exact triangles: kernels cannot compute the distance of a place from these."""
     if any(isinstance(one, Mesh) for one in surface.surfaces()):
         raise SceneError(
             f"{name} must not be of a Mesh, which is known at its triangles only, got {surface!r:.200}; {verb} "
@@ -149,7 +149,7 @@ def _whole(scene: Scene, name: str, surface: Surface) -> Surface:
     except SceneError:
         if all(map(math.isfinite, np.ravel(other_side(solid).bounds()))):
             raise
-        # It has no end: what of it is in the cell counts.
+        # An unbounded surface counts as far as it is in the cell.
         return surface
     if len(images) == 1:
         return images[0] if side == "outside" else other_side(images[0])
@@ -157,7 +157,7 @@ def _whole(scene: Scene, name: str, surface: Surface) -> Surface:
 
 
 def _one_wall(surface: Surface) -> Any:
-    """The wall of a surface that is the same from its other side with the sign changed; None of any other."""
+    """The wall of a surface if it differs between its two sides by the sign alone, else None."""
     walls = () if surface.is_field else surface.walls()
     return walls[0].reversible() if len(walls) == 1 else None
 

@@ -1,4 +1,4 @@
-"""How deep soft contacts are at the speeds that are known before a run: said where they are too soft for these."""
+"""The depths of soft contacts at the speeds that are known before a run, and the warning where these are too deep."""
 
 import logging
 import math
@@ -38,8 +38,8 @@ def warn_of_depths(task: Task) -> None:
 def depths_of(method: Method, mass: Floats, speed: Floats | float, restitution: float = 1.0) -> Floats:
     """The largest overlaps [m] of contacts that begin at these speeds [m/s], of masses that move alone [kg].
 
-    Without losses that of the energy, alpha d^(a + 1)/(a + 1) = m v^2/2. Phi(d) then is the amplitude of an oscillator
-    (`damping_of`), which with the part z of critical damping is smaller by
+    Without losses the depth d follows from the energy, alpha d^(a + 1)/(a + 1) = m v^2/2. Phi(d) is then the amplitude
+    of an oscillator (`damping_of`); with the part z of critical damping it is smaller by the factor
         exp(-z acos(z)/sqrt(1 - z^2)).
     """
     a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
@@ -58,10 +58,10 @@ def _turned(z: float) -> float:
 
 
 def _penalty(method: Method, depth: float, allowed: float) -> float:
-    """The penalty with which a depth is what is allowed [m], to two digits."""
+    """The penalty with which a contact is as deep as allowed [m], rounded up to two digits."""
     a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
     enough = float(alpha * math.pow(depth / allowed, a + 1.0))
-    # Upwards: what a sentence names is enough.
+    # Rounded up, so that the penalty that the sentence names is enough.
     unit = 10.0 ** (math.floor(math.log10(enough)) - 1)
     return math.ceil(enough / unit) * unit
 
@@ -80,7 +80,7 @@ def _falls(scene: Scene, position: Floats) -> Floats:
 
 
 def _pace(surface: Surface) -> float:
-    """A bound of the speed of a surface that moves by itself [m/s]."""
+    """A bound of the speed of a surface with a motion [m/s]."""
     if surface.motion is None:
         return 0.0
     drive = drive_of(surface, 0.0)
@@ -106,7 +106,7 @@ def depths_at_start(scene: Scene, particles: Particles, method: Method) -> Float
         return depths_of(method, particles.mass, np.full(len(particles), fastest))
 
 
-# --- What is said ----------------------------------------------------------------------------------------
+# --- Warnings --------------------------------------------------------------------------------------------
 
 
 def _warn_of_walls(scene: Scene, particles: Particles, radius: Floats, method: Method) -> None:

@@ -1,11 +1,11 @@
 """Unions among the walls of a scene: each a union of rooms, and a room the intersection of the sides of its walls.
 
-A particle is in the rooms that hold it, to a small distance, `Walls.slack`. Its flight leaves a union where it leaves
-the last of these, unless it is inside of another one there by more than that: then it goes on, in the next pass. So
-rooms that touch without overlapping stay apart, and no round-off lets a particle out at an edge.
+A particle is in the rooms that contain it, to a small distance, `Walls.slack`. Its flight leaves a union where it
+leaves the last of these, unless it is inside of another room there by more than that: then it goes on, in the next
+pass. So rooms that touch without overlapping stay apart, and no round-off lets a particle out at an edge.
 
-What is asked here of the rooms of a union is given them as `Walls.joined` does: for each room its walls, as (number,
-wall, 1/the steepness of its level).
+The functions take the rooms of a union as `Walls.joined` gives them: for each room its walls, as (number, wall, 1/the
+steepness of its level).
 """
 
 import math
@@ -18,22 +18,22 @@ from .absence import BEYOND, FLIES, Absence, lie_on_each_other
 
 # A flight goes on into a room that it is inside of by so many times the slack.
 _INSIDE = 4.0
-# So many walls at most are gone through in one pass: two balls 6.1 ns an impact, and 6.7 in two; but a box, a tube and
-# a box, which have eight and are left seldom, 18 and 14.
+# In unions of at most so many walls a flight goes through several rooms in one pass. For two balls an impact then takes
+# 6.1 ns, in place of 6.7; but for a box, a tube and a box, with eight walls and few doorways, 18 in place of 14.
 _AT_ONCE = 4
-# Of the slack, how far beyond its wall a particle goes on: it is in the other room alone then.
+# So many times the slack beyond a wall a particle goes on: there it is in the other room alone.
 _THROUGH = 2.0
 # Walls nearer than so many times the slack touch a particle; more of them than any room has.
 _TOUCH, _OUT = 1024.0, 1e6
 
 
 def gaps_in(rooms, r, t=0.0):
-    """How far a point is outside of each room after a time [s], about: a length, below 0 inside."""
+    """About how far a point is outside of each room after a time [s]: lengths [m], below 0 inside."""
     return tuple(gap_in(room, r, t) for room in rooms)
 
 
 def gap_in(room, r, t=0.0):
-    """The same of one room."""
+    """About how far a point is outside of one room after a time [s] [m]."""
     farthest = -math.inf
     for _number, wall, gentle in reversed(room):
         then = wall.later(t)
@@ -51,7 +51,7 @@ def least_of(gaps):
 
 
 def held_by(walls, gaps):
-    """Which rooms hold a point, by its gaps: the nearest one at least."""
+    """Which rooms contain a point with these gaps: at least the nearest one."""
     held: Any = ()
     least, nearest = least_of(gaps), False
     for gap in gaps:
@@ -79,8 +79,8 @@ def is_inside_any(walls, gaps):
 def leaving(walls, rooms, leaves, gravity, flight, stops):
     """When a flight (r, v) leaves a union: (time, wall or -1).
 
-    `leaves` are the times when it leaves each room, with the wall, or -1 where what comes after is not known yet. Where
-    it goes on in another room there the wall is -1, unless it `stops`.
+    `leaves` has for each room (the time at which the flight leaves it, the wall, or -1 if it surely stays inside until
+    then). Where the flight goes on in another room the wall is -1, unless it `stops`.
     """
     r, v = flight
     held = held_by(walls, gaps_in(rooms, r))
@@ -101,7 +101,7 @@ def leaving(walls, rooms, leaves, gravity, flight, stops):
 
 
 def _leaves_once(room):
-    """Whether a flight that comes into a room leaves it by the first hits with its walls, as known at its start."""
+    """Whether a flight that enters a room leaves it by the first hits with its walls that are found at the start."""
     once = True
     for _number, wall, _gentle in room:
         once = False if once is False or wall.leaves_once is False else once & wall.leaves_once
@@ -109,9 +109,9 @@ def _leaves_once(room):
 
 
 def _through(walls, rooms, leaves, exits, flight, left):
-    """When a flight (r, v) leaves the rooms that it is inside of where it leaves one, and at which wall: (time, wall).
+    """When a flight (r, v) that leaves a room leaves the other rooms there: (time, wall).
 
-    Of walls that are left once the times are known; where one is not after that, it goes on in the next pass.
+    The times of walls that are left once are known. Where none of these is later, the flight goes on in the next pass.
     """
     (r, v), (time, wall) = flight, left
     last, number, inside = time, wall, False
@@ -125,20 +125,20 @@ def _through(walls, rooms, leaves, exits, flight, left):
 
 
 def at_the_end(walls, gravity, v, remaining, hit):
-    """A `Hit` that is round-off later than the end of the frame, at that: else what touches a wall may be beyond it."""
+    """The `Hit`, at the end of the frame if it is later by round-off: no particle ends beyond a wall it touches."""
     late, w = hit.time - remaining, accelerated(gravity, v, remaining)
     soon = (hit.wall >= 0.0) & (late > 0.0) & (late * late * square(w) <= walls.slack * walls.slack)
     return hit._replace(time=select(soon, remaining, hit.time))
 
 
 def inside_of(walls, number, r):
-    """A place, a little inside of the wall with this number if that is one of a room; else as it is."""
+    """The place r, moved a little inside of the wall with this number if that is the wall of a room."""
     is_of_room = number >= walls.joined()[0][0][0][0]
     return r - select(is_of_room, walls.inset, 0.0) * walls.unit_normal(number, r)
 
 
 def owner_of(walls, rooms, r):
-    """The number of the room asked for the walls near a point: that with the fewest walls there, then the deepest."""
+    """The number of the room that gives the walls near a point: with the fewest walls there, then the deepest."""
     owner, fewest, deepest = 0, math.inf, math.inf
     for k, room in enumerate(rooms):
         gap, touching = gap_in(room, r), 0.0
@@ -155,14 +155,14 @@ def owner_of(walls, rooms, r):
     return owner
 
 
-# --- For what is on their walls --------------------------------------------------------------------------
+# --- Particles on walls ----------------------------------------------------------------------------------
 
 
 class Rooms(Absence):
     """The rooms of a union: a wall is absent in another room, and outside of its own.
 
-    Edges between rooms are re-entrant: particles that slide on a wall of one into another one fly on there. Where walls
-    of two rooms lie on each other, as the floors of two boxes side by side, they go on on that of the other one.
+    Edges between rooms are re-entrant: a particle that slides from one room into another flies on there. Where walls of
+    two rooms lie on each other, as the floors of two boxes side by side, it slides on along the wall of the other room.
     """
 
     rooms: Any
@@ -201,12 +201,12 @@ def is_of_room(room, wall):
 
 
 def depth_behind(walls):
-    """How deep in the next room particles go on that came through an open wall [m]."""
+    """How deep inside of the next room particles go on after they pass an open wall [m]."""
     return _THROUGH * walls.slack if walls.inset is None else walls.inset
 
 
 def other_side(walls, wall, r):
-    """The other side of a wall at a place on it."""
+    """The place on the other side of a wall, from a place on it."""
     return walls.project(wall, r) + depth_behind(walls) * walls.unit_normal(wall, r)
 
 

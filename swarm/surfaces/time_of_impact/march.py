@@ -1,7 +1,7 @@
-"""The first hit of a flight by looks at it: each says for how long it surely meets nothing, so no root is skipped.
+"""The first hit of a flight by safe steps: in each the flight surely meets nothing, so no root is skipped.
 
-Here a look at a wall follows from `hessian_bounds`, by the root of a parabola above its level. A sampled surface, one
-by functions and walls in motion say in other ways for how long.
+A *look* at a flight gives the next safe step. Here it follows from `hessian_bounds`, by the root of a parabola above
+the level. Sampled surfaces, surfaces by functions and walls in motion have looks of other kinds.
 """
 
 import math
@@ -13,10 +13,10 @@ from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot, norm, square, total
 from .course import rise_time
 
-# Looks of one flight; near the wall each one doubles the digits. What is not found by then goes on in the next pass. A
-# fall may end before it meets the wall, which nothing here knows: from `hessian_bounds` it looks less far ahead.
+# The most looks at one flight; near the wall each one doubles the digits. A hit that is not found then is searched in
+# the next pass. The frame may end before a fall meets the wall, so a fall has fewer looks with `hessian_bounds`.
 LOOKS, FALLING_LOOKS = 200, 16
-# Bisections of an interval down to neighbouring numbers.
+# The most bisections of an interval, down to neighbouring floats.
 _BISECTIONS = 1100
 
 
@@ -24,16 +24,16 @@ _BISECTIONS = 1100
 
 
 class SafeStep(Record):
-    """One look at a flight: a time from which on it surely meets nothing for so long, infinite if it never does."""
+    """One look at a flight: it surely meets nothing for `time` from `since` on; infinite if it never does."""
 
     since: Any
     time: Any
-    wall: Any = 0.0  # the wall that it is at after that time, or -1
-    past: Any = -1.0  # a wall that it is past at this time by more than round-off, or -1
+    wall: Any = 0.0  # the wall that the flight is at after that time, or -1
+    past: Any = -1.0  # a wall that it has passed at `since` by more than round-off, or -1
 
 
 class Search(Record):
-    """A flight that is looked at; those to one wall have the fields `surface`, r, v and `pull`."""
+    """A flight to search; one to a single wall has the fields `surface`, r, v and `pull`."""
 
     start, longest, looks = 0.0, math.inf, LOOKS
 
@@ -42,14 +42,14 @@ class Search(Record):
         raise NotImplementedError
 
     def past(self: Any, t):
-        """A wall that it is past at a time, or -1."""
+        """A wall that the flight has passed at a time, or -1."""
         surface = self.surface
         level = surface.level_of(surface.inner(self.r + t * (self.v + (0.5 * t) * self.pull)))
         return select(level > 0.0, 0.0, -1.0)
 
 
 class ToWall(Search):
-    """A flight to one wall that is asked for its `look`."""
+    """A flight to one wall, with the looks of that wall."""
 
     surface: Any
     r: Vec
@@ -62,7 +62,7 @@ class ToWall(Search):
 
 
 def first_met(flight):
-    """(when a flight meets a wall, which); the wall is -1 where it is only known to meet none until then."""
+    """(time, wall) at which a flight meets a wall; the wall is -1 if it surely meets none until then."""
     t, before = flight.start, flight.start
     for i in range(flight.looks):
         look = flight.look(t, i == 0)
@@ -73,13 +73,13 @@ def first_met(flight):
         if look.wall >= 0.0:
             return t, look.wall
         if not goes_on:
-            # Never to meet a wall is known as well as a hit.
+            # That the flight never meets a wall is final, as a hit is.
             return flight.longest, select(flight.longest < math.inf, -1.0, 0.0)
     return t, -1.0
 
 
 def bisected(flight, low, high, wall):
-    """(the last time between two at which a flight is past no wall, that which it is past then)."""
+    """(the last time between two at which a flight has passed no wall, the wall that it passes then)."""
     for _i in range(_BISECTIONS):
         t = 0.5 * (low + high)
         if not low < t < high:
@@ -97,7 +97,7 @@ def bisected(flight, low, high, wall):
 
 @outlined
 def march(surface, r, v, pull):
-    """`first_hit` of a wall alone."""
+    """`first_hit` of a single wall."""
     straight = pull.x == 0.0 and pull.y == 0.0 and pull.z == 0.0
     time, wall = first_met(ToWall(surface, r, v, pull, LOOKS if straight else surface.falling_looks))
     return time, wall >= 0.0
@@ -113,7 +113,7 @@ def look(surface, r, v, pull, t, is_first):
     """The `SafeStep` at a wall."""
     p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
     level, half, step, way, steepness = safe_step(surface, p, w, pull, 0.0)
-    # By round-off, or because the surface bends more than its file says.
+    # The flight is past the wall by round-off, or because the surface bends more than it was said to.
     is_past = level > 0.0 and half > 0.0 and not is_first
     room = 2.0 * EPSILON * total(absolute(p))
     slack = room * steepness
@@ -128,19 +128,19 @@ def look(surface, r, v, pull, t, is_first):
 
 
 def lets_go(level, half, step, slack):
-    """Whether a flight leaves a wall so slowly that its safe step is a matter of round-off; `slack` is that of a level.
+    """Whether a flight leaves a wall so slowly that round-off decides its safe step; `slack` is that of the level.
 
-    A particle that slides lets go where the wall bends neither to it nor away, and flies on along it. A bound of the
-    bend is above 0 there: the step ends where the particle may be back, after 1e-16 of what the bend takes, and the
-    next one too, without end; the time does not change, or the places that these steps are rounded to drift through the
-    wall. Round-off does not distinguish such a place from one on the wall: the step may end that deep outside.
+    A particle that slides leaves the wall where that bends neither towards it nor away, and flies along it. The bound
+    of the curvature is above 0 there, so the step ends where the particle might be back, after 1e-16 of the way, and
+    so does the next one, without end: the time does not change, or the rounded places drift through the wall. As
+    round-off does not distinguish such a place from one on the wall, the step may end that deep outside.
     """
     return (half < 0.0) & (level >= -slack) & (-half * step <= slack)
 
 
 @outlined
 def safe_step(surface, r, v, pull, slack):
-    """(level, half its derivative, a time during which the flight stays admissible, how far it goes at most, |grad q|).
+    """(level, half its derivative, a time during which the flight stays admissible, its way at most, |grad q|).
 
     With a slack the level counts as so much below 0.
     """
@@ -150,8 +150,8 @@ def safe_step(surface, r, v, pull, slack):
     half = 0.5 * side * dot(n, v)
     speed2 = square(v)
     speed, g = math.sqrt(speed2), norm(pull)
-    # level'' = 2 side (w.H w) + side grad q.G <= 2 M, where |w|^2 <= |v|^2 + 2 |G| s and grad q turns by 2 H s at most
-    # on the way s: M = m0 + m1 s
+    # level'' = 2 side (w.H w) + side grad q.G <= 2 M, where |w|^2 <= |v|^2 + 2 |G| s and grad q changes by 2 H s at
+    # most on the way s: M = m0 + m1 s
     if g == 0.0:
         m0, m1 = most * speed2, 0.0
     else:
