@@ -248,19 +248,19 @@ class Scene:
         return {}
 
     @cached_property
-    def _pieces_of_vaults(self) -> Pieces:
+    def _pieces_of_joined_rooms(self) -> Pieces:
         """The pieces that balls meet: a union of several rooms, or a foam, is one of them."""
         images = [image for images in self.pieces.images for image in images]
         if not any(len(one.rooms) > 1 or one.is_foam() for one in images):
             return self.pieces
-        from .surfaces.balls.vault import vault_of  # loaded where balls are
+        from .surfaces.balls.joined_rooms import joined_rooms_of  # loaded where balls are
 
-        return pieces_of([vault_of(one) if len(one.rooms) > 1 or one.is_foam() else one for one in images], None)
+        return pieces_of([joined_rooms_of(one) if len(one.rooms) > 1 or one.is_foam() else one for one in images], None)
 
     def pieces_of_balls(self, largest: float) -> Pieces:
         """The pieces that balls in the cell meet, with radii up to the largest one [m]."""
         if self.period is None:
-            return self._pieces_of_vaults
+            return self._pieces_of_joined_rooms
         known = self._pieces_by_radius
         # The pieces of larger balls do as well.
         largest = min((one for one in known if one >= largest), default=largest)

@@ -45,7 +45,7 @@ run = {until = 1.0}
 """
 # What takes time to import, and a run of few points in a sphere does not need.
 _NEEDLESS = {
-    "numba", "psutil", "numpy.ma", "importlib.metadata", "rich", "swarm.words", "swarm.surfaces.balls.vault",
+    "numba", "psutil", "numpy.ma", "importlib.metadata", "rich", "swarm.words", "swarm.surfaces.balls.joined_rooms",
     "swarm.surfaces.data.sampled", "swarm.surfaces.formulas", "swarm.surfaces.presence.seams", "swarm.methods.penalty",
     "swarm.surfaces.shapes.torus",
 }  # fmt: skip

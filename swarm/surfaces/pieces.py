@@ -100,7 +100,7 @@ def pieces_of(surfaces: Sequence[Surface], period: Lengths | None, largest: floa
 def differing_in(union: Surface) -> str | None:
     """What the parts of a union do not have in common, by the name of the argument; None: all of it is the same."""
     surfaces = union.surfaces()
-    from .fields.one_vault import IN_COMMON  # loaded where rooms are joined
+    from .fields.soft_rooms import IN_COMMON  # loaded where rooms are joined
 
     for name in IN_COMMON:
         if len({repr(getattr(surface, name)) for surface in surfaces}) > 1:

@@ -175,15 +175,15 @@ class Joined(Surface):
     def as_one_wall(self) -> Surface:
         if len(self.rooms) == 1:
             return self
-        from .fields.one_vault import soft_vault  # loaded where rooms are joined
+        from .fields.soft_rooms import soft_rooms  # loaded where rooms are joined
 
-        return soft_vault(self)
+        return soft_rooms(self)
 
     def holds_balls(self) -> str | None:
         if len(self.rooms) > 1:
-            from .balls.vault import no_balls_in  # loaded where balls are
+            from .balls.joined_rooms import why_no_balls_in  # loaded where balls are
 
-            return no_balls_in(self)
+            return why_no_balls_in(self)
         whys = ((surface, surface.holds_balls()) for surface in self.surfaces())
         return next((f"with a {type(surface).__name__}, {why}" for surface, why in whys if why is not None), None)
 

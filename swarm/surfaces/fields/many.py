@@ -187,9 +187,9 @@ class Many(Surface):
 
     def holds_balls(self) -> str | None:
         if self.is_foam():
-            from ..balls.vault import no_balls_in  # loaded where balls are
+            from ..balls.joined_rooms import why_no_balls_in  # loaded where balls are
 
-            return no_balls_in(self)
+            return why_no_balls_in(self)
         return self.solids()[0].holds_balls()
 
     def contain(self, points: Floats) -> NDArray[np.bool_]:

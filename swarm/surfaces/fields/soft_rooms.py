@@ -13,7 +13,7 @@ from typing import Any
 from ...kernel.jit import outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, either
-from ..balls.vault import Vault
+from ..balls.joined_rooms import JoinedRooms
 from ..presence.joined import with_rooms
 from ..time_of_impact import flights
 from ..walls import Walls, all_walls
@@ -43,7 +43,7 @@ class RoomsTogether(Record):
 
 
 @dataclass(frozen=True, repr=False)
-class SoftVault(Vault):
+class SoftRooms(JoinedRooms):
     """A union of several rooms, as points meet it that go into its wall."""
 
     is_one_wall = True
@@ -57,10 +57,10 @@ class SoftVault(Vault):
         return OneWall(RoomsTogether(with_rooms(whole, [self.rooms_of])), None)
 
 
-def soft_vault(union: Any) -> SoftVault:
+def soft_rooms(union: Any) -> SoftRooms:
     """A union of several rooms as one wall, with what all of its parts have in common."""
     one = union.rooms[0][0]
-    return SoftVault(rooms_of=union.rooms, **{name: getattr(one, name) for name in IN_COMMON})
+    return SoftRooms(rooms_of=union.rooms, **{name: getattr(one, name) for name in IN_COMMON})
 
 
 @outlined

@@ -80,7 +80,7 @@ class Rim(Record):
         return Bent(n, -clear, most, max(most, 0.5 / select(short > 0.0, short, 1.0)), reach, max(clear, 0.0))
 
 
-class Vaulted(Smooth):
+class JoinedFaces(Smooth):
     """The wall of the centres of balls: the places a radius away from faces of a union, their edges and their tips."""
 
     rooms: Any  # the walls of each room of the union

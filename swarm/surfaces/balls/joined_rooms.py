@@ -20,8 +20,8 @@ from ..shapes.slab import Slab
 from ..shapes.sphere import Sphere
 from ..surface import Box as Bounds
 from ..surface import Surface
+from .joined_faces import FLAT, JoinedFaces, RoomEdge, RoomFace, crossing, is_seen, outward
 from .tip import TipPlane
-from .vaulted import FLAT, RoomEdge, RoomFace, Vaulted, crossing, is_seen, outward
 
 # Parts of the extent: the round-off of a place, and a distance that is larger than any other.
 _SLACK, _FAR = 1e-11, 1e6
@@ -40,7 +40,7 @@ _KINDS = Sphere, Plane, Slab, Box, Cylinder, Cone
 
 
 @dataclass(frozen=True, repr=False)
-class Vault(Surface):
+class JoinedRooms(Surface):
     """A union of several rooms as one surface."""
 
     rooms_of: Any = ()
@@ -93,14 +93,14 @@ class Vault(Surface):
         return np.where(outside > 0.0, outside + radius, found)
 
 
-def vault_of(union: Any) -> Vault:
-    """The `Vault` of a union of several rooms, or of a foam."""
+def joined_rooms_of(union: Any) -> JoinedRooms:
+    """The `JoinedRooms` of a union of several rooms, or of a foam."""
     rooms = union.rooms_of_balls()
     one, still = rooms[0][0], [[replace(one.at_rest(), openings=(), present=None) for one in room] for room in rooms]
-    return Vault(rooms_of=tuple(map(tuple, still)), **{name: getattr(one, name) for name in (*_LAWS, *_CHANGES)})
+    return JoinedRooms(rooms_of=tuple(map(tuple, still)), **{name: getattr(one, name) for name in (*_LAWS, *_CHANGES)})
 
 
-def no_balls_in(union: Any) -> str | None:
+def why_no_balls_in(union: Any) -> str | None:
     """Why balls cannot meet a union of several rooms, or a foam, for the sentence of an error; None where they can."""
     rooms = union.rooms_of_balls()
     surfaces = [surface for room in rooms for surface in room]
@@ -123,21 +123,21 @@ def no_balls_in(union: Any) -> str | None:
 _KNOWN: dict[Any, tuple[Any, ...]] = {}
 
 
-def _walls_of(vault: Vault) -> tuple[Any, ...]:
-    key = repr(vault.rooms_of)
+def _walls_of(joined: JoinedRooms) -> tuple[Any, ...]:
+    key = repr(joined.rooms_of)
     if key not in _KNOWN:
         _KNOWN.clear()
-        _KNOWN[key] = tuple(_made(vault))
+        _KNOWN[key] = tuple(_made(joined))
     return _KNOWN[key]
 
 
-def _made(vault: Vault) -> list[Vaulted]:
-    rooms = tuple(tuple(wall for _surface, wall in _each(room)) for room in vault.rooms_of)
-    extent = vault.extent()
-    slack, places, bounds = _SLACK * extent, _places_in(vault), [room_bounds(room) for room in vault.rooms_of]
+def _made(joined: JoinedRooms) -> list[JoinedFaces]:
+    rooms = tuple(tuple(wall for _surface, wall in _each(room)) for room in joined.rooms_of)
+    extent = joined.extent()
+    slack, places, bounds = _SLACK * extent, _places_in(joined), [room_bounds(room) for room in joined.rooms_of]
     faces = [
         RoomFace(wall, (k, k), *_bend_of(one, wall))
-        for k, room in enumerate(vault.rooms_of) for one, wall in _each(room)
+        for k, room in enumerate(joined.rooms_of) for one, wall in _each(room)
     ]  # fmt: skip
     first = np.cumsum([0, *map(len, rooms)]).tolist()
     group, edges = list(range(len(faces))), []
@@ -153,7 +153,7 @@ def _made(vault: Vault) -> list[Vaulted]:
             new = (x for x, known in ends if all(norm(x - tip) > known for _i, tip in tips))
             tips.extend((first[k] + a, tip) for tip in new)
     return [
-        Vaulted(
+        JoinedFaces(
             rooms, tuple(face for face, g in zip(faces, group, strict=True) if g == mine),
             tuple(edge for i, edge in edges if group[i] == mine),
             tuple(tip for i, tip in tips if group[i] == mine), 0.0, slack, _FAR * extent,
@@ -178,8 +178,8 @@ def _bend_of(surface: Surface, wall: Any) -> tuple[float | None, float]:
     return math.inf, 0.0
 
 
-def _places_in(vault: Vault) -> list[Vec]:
-    low, high = (np.clip(end, -vault.extent(), vault.extent()) for end in vault.bounds())
+def _places_in(joined: JoinedRooms) -> list[Vec]:
+    low, high = (np.clip(end, -joined.extent(), joined.extent()) for end in joined.bounds())
     return [Vec(*place) for place in np.random.default_rng(0).uniform(low, high, (_PLACES, 3)).tolist()]
 
 
