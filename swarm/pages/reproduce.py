@@ -169,7 +169,8 @@ def _python(trajectory: Any) -> str:
     bodies = trajectory.body is not None
     more = [f"{name}={value!r}" for name, value in _span(trajectory).items()]
     more += [f"seed={trajectory.seed}"] * bool(trajectory.seed) + ["counters=run.counters"] * bool(counters)
-    more += ["member_impacts=True"] * bool(_members(trajectory))
+    seen = trajectory.observables_of(slice(1))
+    more += ["member_impacts=True"] * any(name.startswith("member_") for name in seen)
     name, method, home = trajectory.path.name, trajectory.method, type(trajectory.method).__module__
     named = isinstance(method, NamedMethod)
     given = f"{method if named else 'run.method'}, {', '.join(more)}"
@@ -181,7 +182,3 @@ def _python(trajectory: Any) -> str:
         f"    start = run.{'bodies' if bodies else 'frame'}(0)",
         f"    again = swarm.simulate(run.scene, start, {given}, trajectory='again.h5')",
     ])  # fmt: skip
-
-
-def _members(trajectory: Any) -> bool:
-    return any(name.startswith("member_") for name in trajectory.observables_of(slice(1)))

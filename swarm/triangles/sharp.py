@@ -219,14 +219,10 @@ def _frame(surface: Surface) -> tuple[Floats, Surface]:
     frame, own = whole.own_frame()
     own |= {"motion": None, "mass": None, "inertia": None}
     if hasattr(whole, "center"):
-        own |= {"rotation": None, "center": _in(frame, whole.center)}
+        own |= {"rotation": None, "center": tuple((frame.T @ np.array(whole.center)).tolist())}
     elif whole.rotation is not None:
         return np.eye(3), replace(whole, motion=None, mass=None, inertia=None)
     return frame, replace(whole, **own)
-
-
-def _in(frame: Floats, point: Any) -> Any:
-    return tuple((frame.T @ np.array(point)).tolist())
 
 
 def _triangles(placed: _Placed, wall: SmoothSurface, low: Floats, high: Floats) -> tuple[Floats, Indices]:

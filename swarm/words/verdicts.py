@@ -226,7 +226,8 @@ def _books(content: Any) -> list[Statement]:
     came += f"; {many(blocked)} births found no free place at their time" if blocked else ""
     if inside < 0 or (kept and frame is not None and seen_there != there):
         return [Statement("particles", f"{listed(parts)} do not add up to {many(there)}{came}", False)]
-    if ends["escaped"] and not content.scene.is_open() and not _has_openings(content.scene):
+    ways = content.scene.is_open() or any(one.openings or one.present is not None for one in content.scene.pieces.each)
+    if ends["escaped"] and not ways:
         return [Statement("particles", f"{many(ends['escaped'])} of {many(there)} passed through a closed wall", False)]
     return [Statement("particles", f"{many(there)} = {' + '.join(parts)}{came}", True)]
 
@@ -246,7 +247,3 @@ def at_start(content: Any) -> int:
         return int((~np.isnan(frame.position[0])).sum() - np.sum(born[0]))
     # The run has reached its end: all particles of its sources are born.
     return int(content.count - np.sum(born[-1]))
-
-
-def _has_openings(scene: Any) -> bool:
-    return any(piece.openings or piece.present is not None for piece in scene.pieces.each)

@@ -92,7 +92,8 @@ def _counted(scene: Scene, name: str, counter: Counter) -> Counted:
     if counter.inside is not None:
         _require_no_mesh(f"{name}.inside", counter.inside, "use")
     surface = _whole(scene, name, counter.surface)
-    near = _NEAR * max(scene.finite_size(), scene.extent(), _finite(surface.extent()))
+    extent = surface.extent()
+    near = _NEAR * max(scene.finite_size(), scene.extent(), extent if math.isfinite(extent) else 0.0)
     volumes = None
     if counter.inside is not None:
         volumes = volumes_in(volumes_of_counter(counter.inside, scene.period, f"{name}.inside"))
@@ -132,10 +133,6 @@ def _alone(scene: Scene, name: str, surface: Surface) -> Scene:
         return Scene([surface], scene.gravity, plane=scene.plane)
     except SceneError as error:
         raise SceneError(str(error).replace("surfaces[0]", name)) from None
-
-
-def _finite(length: float) -> float:
-    return length if math.isfinite(length) else 0.0
 
 
 def _whole(scene: Scene, name: str, surface: Surface) -> Surface:

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -58,7 +57,8 @@ def images_of(surface: Surface, period: Lengths, name: str, largest: float = 0.0
         if length is not None and not is_same_along(surface, k, period):
             title = f"{name} ({type(surface).__name__})"
             shifts[k] = _shifts(surface, (low[k], high[k]), length, title, k, largest)
-    found = [_shifted(surface, shift) for shift in itertools.product(*shifts)]
+    every = itertools.product(*shifts)
+    found = [surface.shifted(shift) if any(shift) else surface for shift in every]  # type: ignore[arg-type]
     if len(found) > 1 and any(isinstance(one, Rotation) for one in parts_of(surface.motion)):
         raise SceneError(
             f"{name}.motion must not turn a surface that reaches over a face of the cell, got {surface.motion}; move "
@@ -144,10 +144,6 @@ def extent_of(surface: Surface) -> Box:
         return surface.enclosing_box()
     body = replace(surface, side="inside", motion=None) if surface.is_solid() else surface  # type: ignore[call-arg]
     return body.bounds()
-
-
-def _shifted(surface: Surface, shift: Sequence[float]) -> Surface:
-    return surface.shifted(tuple(shift)) if any(shift) else surface  # type: ignore[arg-type]
 
 
 def is_same_along(surface: Surface, k: int, period: Lengths, least: float = _NO_SLOPE) -> bool:

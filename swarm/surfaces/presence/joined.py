@@ -33,13 +33,9 @@ def with_rooms(walls: Walls, unions: Sequence[Sequence[Sequence[Surface]]]) -> W
         # Lanes take the safe steps of walls that hold every particle.
         walls = Marched(*walls)
     slack = _SLACK * (extent or 1.0)
-    inset = _INSET * slack if any(map(_touch, unions)) else None
+    touch = any(_wall_between(*pair) for rooms in unions for pair in itertools.combinations(rooms, 2))
+    inset = _INSET * slack if touch else None
     return walls._replace(unions=gentle, slack=slack, inset=inset)
-
-
-def _touch(rooms: Sequence[Sequence[Surface]]) -> bool:
-    """Whether two rooms have a wall in common, seen from both sides."""
-    return any(_wall_between(one, other) for one, other in itertools.combinations(rooms, 2))
 
 
 def _wall_between(one: Sequence[Surface], other: Sequence[Surface]) -> bool:
