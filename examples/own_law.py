@@ -2,7 +2,7 @@
 
 A record derived from `WallLaw` is what kernels take: numbers, and `leave`, the velocity after an impact, or a `Leave`
 that also says whether the particle stays in the run, and how long it waits on the wall. The same method runs in plain
-Python and in compiled kernels: numbers in, numbers out, no lists and no arrays. `book` says where energy is booked.
+Python and in compiled kernels: numbers in, numbers out, no lists or arrays. `book` names the observable of the energy.
 """
 
 import swarm
@@ -34,7 +34,7 @@ class Glue(swarm.WallLaw):
 
 
 if __name__ == "__main__":
-    # `restitution` and `friction` are of the last, smallest hops, after which a ball does not leave the floor.
+    # `restitution` and `friction` act on the last, smallest hops, after which a ball stays on the floor.
     laws = [Glue(0.5, 0.05), Viscoelastic(2.0)]
     vessel = swarm.Cylinder(0.2, (0, 0, 1), 0.4, laws=laws, restitution=0.8, friction=0.3)
     scene = swarm.Scene([vessel], gravity=(0, 0, -9.81))

@@ -2,10 +2,10 @@
 
     python examples/own_method.py
 
-It is `swarm.Impact` without its care: nothing restores the energy from round-off, walls are elastic, and a particle
-that grazes its wall takes as many impacts as that takes. `from swarm.methods import contract; help(contract)` says what
-it may have.
-Numbers of a method are annotated fields of its record, as of `WallLaw`; losses are for laws of walls, which are booked.
+Unlike `swarm.Impact` it does not restore the energy from round-off, walls are elastic, and a particle that grazes its
+wall takes all of its impacts. `from swarm.methods import contract; help(contract)` says what a method may have.
+The numbers of a method are annotated fields of its record, as those of a `WallLaw`. Losses are for laws of walls: no
+observable counts what a method itself takes.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ class Mirror(Method):
 
 
 class MirrorNumbers(contract.MethodNumbers):
-    """What kernels know of the method: which it is."""
+    """The record that kernels take; this method has no numbers."""
 
     def constants(self, mass, energy, scale2):
         return 0.0, 0.0, 0.0

@@ -3,7 +3,7 @@
 1. A record derived from `Smooth` is what kernels take in place of the surface: numbers, and methods of them. Its field
    `side` is +1 for a cavity. swarm/surfaces/contract.py describes all methods that there are. Five serve every method
    of simulation: `phi`, `gradient`, `hessian`, `hessian_bounds` and `farthest_push`. The first hit is then found by
-   safe steps. What is missing is an error in one sentence.
+   safe steps. A method that is missing is an error in one sentence.
 2. A dataclass derived from `Surface` is what scenes take: it makes the numbers and says how large the surface is.
 
 The same methods run in plain Python and in compiled kernels: numbers in, numbers out, no lists and no arrays. Where
@@ -19,23 +19,23 @@ from swarm.surfaces import Smooth, Surface
 
 
 class SuperellipsoidNumbers(Smooth):
-    """What kernels take of it."""
+    """The record that kernels take."""
 
     a: Vec  # the semi-axes
     n: float
     side: float
 
     def powers(self, r, k):
-        """(x/a)^(n - k)/a^k, the k-th derivative of (x/a)^n but for a constant; likewise of y and z."""
+        """(x/a)^(n - k)/a^k, the k-th derivative of (x/a)^n up to a constant factor, and the same for y and z."""
         a, p = self.a, self.n - k
         return Vec((r.x / a.x) ** p / a.x**k, (r.y / a.y) ** p / a.y**k, (r.z / a.z) ** p / a.z**k)
 
     def phi(self, r):
-        """Below 0 inside."""
+        """The implicit function: below 0 inside."""
         return total(self.powers(r, 0.0)) - 1.0
 
     def gradient(self, r):
-        """Its gradient."""
+        """The gradient of phi."""
         return self.n * self.powers(r, 1.0)
 
     def hessian(self, r):
@@ -49,7 +49,7 @@ class SuperellipsoidNumbers(Smooth):
         return max(h.xx, h.yy, h.zz), max(h.xx, h.yy, h.zz), min(self.a.x, self.a.y, self.a.z)
 
     def farthest_push(self):
-        """A step in contact may push as far as it needs to."""
+        """Steps in contact have no pole."""
         return math.inf
 
 
@@ -61,7 +61,7 @@ class Superellipsoid(Surface):
     n: float = 4.0
 
     def numbers(self):
-        """What kernels take."""
+        """The record of this surface."""
         return SuperellipsoidNumbers(Vec(*map(float, self.semi_axes)), float(self.n), 1.0)
 
     def size(self):
@@ -69,7 +69,7 @@ class Superellipsoid(Surface):
         return min(self.semi_axes)
 
     def extent(self):
-        """How far from the origin the surface goes [m]: for a large n nearly to the corners of a box."""
+        """The largest distance of the surface from the origin [m]; for a large n nearly half a diagonal of the box."""
         return math.hypot(*self.semi_axes)
 
     def bounds(self):

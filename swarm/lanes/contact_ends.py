@@ -1,9 +1,9 @@
-"""The laws of walls with methods of contacts that take time: they act where a contact ends.
+"""Laws of walls in methods with contacts that take time: they act where a contact ends.
 
-There a wall without laws has turned round the normal velocity of a particle, over some steps. Its laws make of that
-what they make of an impact on a rigid wall at which the particle arrives as it would be before: so restitution,
-temperatures and all other laws are those of `Impact`, whatever the penalty, and so is what they take. Friction is
-Coulomb's, of the whole impulse of the contact, also of what carries a weight.
+Over its steps the contact has reversed the normal velocity of the particle, as a wall without laws does. The laws then
+act as at an impact on a rigid wall at which the particle arrives with that velocity reversed again. So restitution,
+temperatures and all other laws, and the energy that they take, are those of `Impact` for any penalty. Friction is
+Coulomb's, with the whole impulse of the contact, also the part that carries a weight.
 """
 
 import math
@@ -20,7 +20,7 @@ from .accounts import add_work
 from .escape import detain
 from .watching.log import Struck
 
-# Newton steps onto a wall, from where a step has ended.
+# Newton steps onto a wall, from the end of a step.
 _SWEEPS = 5
 
 
@@ -37,7 +37,7 @@ def end_contacts(method, walls, gravity, share, lanes, i, before, pushed):
 
 
 def impulses_before(method, walls, lanes, i):
-    """What the walls had given a lane before its hard pass."""
+    """The impulses of the walls on a lane before its hard pass."""
     if method.laws_at_ends is None:
         return None
     kept = scratch(walls.length(), np.float64)
@@ -47,7 +47,7 @@ def impulses_before(method, walls, lanes, i):
 
 
 def end_hard_contacts(method, walls, gravity, share, lanes, i, before, kept):
-    """The same of all walls after a hard pass."""
+    """`end_contacts` with all walls after a hard pass."""
     if method.laws_at_ends is None:
         return
     for s in range(walls.length()):
@@ -56,7 +56,7 @@ def end_hard_contacts(method, walls, gravity, share, lanes, i, before, kept):
 
 
 def _wall_of_row(walls, row, r):
-    """The wall of a row: of a field the member that a point is deepest in, or nearest to."""
+    """The wall of a row; in a field the member that a point is deepest in, or nearest to."""
     if len(walls.fields()) == 0:
         return float(row)
     return _deepest_of_row(walls, row, r)
@@ -79,7 +79,7 @@ def _end(method, walls, gravity, share, lanes, i, step):
     state = share.state
     state.pressed[row, p] += impulse
     now, v = method.at_start(lanes.faced(walls, i), flier.remaining), flier.v
-    # Normals of some walls are right on them alone.
+    # Some walls have exact normals on the wall only.
     r = flier.r
     for _sweep in range(_SWEEPS):
         r = now.project(wall, r)
@@ -88,18 +88,18 @@ def _end(method, walls, gravity, share, lanes, i, step):
     b = max(away, 0.0)
     if now.distance(wall, flier.r) > 0.0 and not (method.multiplies and away > 0.0):
         if away <= 0.0 and dot(relative(u, before), n) < 0.0:
-            # What a weight presses on is rubbed each time that it turns back before the wall lets it go.
+            # In a contact that a weight makes last, friction acts each time that the particle turns back.
             state.pressed[row, p] = 0.0
             _drag(method, walls, share, lanes, i, (wall, n, u, pressed))
         return
     state.pressed[row, p] = 0.0
-    # What has not turned the particle round is the rest of a contact that has ended.
+    # An impulse that has not reversed the particle is the rest of a contact that has ended.
     if pressed >= b:
         _act(method, walls, now, gravity, share, lanes, i, (wall, r, n, u, b, pressed))
 
 
 def _drag(method, walls, share, lanes, i, at):
-    """Friction of a contact that lasts."""
+    """Apply friction in a contact that lasts."""
     wall, n, u, pressed = at
     laws, state, flier, p = method.laws_at_ends, share.state, lanes.lane(i), index(lanes.particle[i])
     if laws.friction is None:
@@ -116,7 +116,7 @@ def _drag(method, walls, share, lanes, i, at):
 
 
 def _act(method, walls, now, gravity, share, lanes, i, at):
-    """The laws of a wall where a contact ends: its place, normal, velocity, the speed away from it, and the impulse."""
+    """Apply the laws of a wall where a contact ends: `at` is (wall, place, normal, velocity, speed away, impulse)."""
     wall, r, n, _u, b, pressed = at
     flier, p, laws = lanes.lane(i), index(lanes.particle[i]), method.laws_at_ends
     mass, impulse = share.state.mass[p], pressed

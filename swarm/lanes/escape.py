@@ -1,4 +1,4 @@
-"""Particles that reach a wall where it is open, or that absorbs them: nothing is left of their frames."""
+"""The ends of particles that reach a wall where it is open, or that absorbs or detains them."""
 
 import math
 
@@ -20,7 +20,7 @@ from .watching.log import Struck
 
 
 def escape(share, p, wall, r, v, remaining):
-    """Particle p has escaped, with so much of its frame left: it stays where and as fast as it is."""
+    """Book that particle p escapes with so much of its frame left; it keeps its place and velocity."""
     share.state.escape_time[p] = share.moment - remaining
     if share.counters is not None:
         share.counters.settle(share, p, ParticleMoment(r, v, remaining))
@@ -28,13 +28,13 @@ def escape(share, p, wall, r, v, remaining):
 
 
 def absorb(share, p, wall, remaining):
-    """A wall has absorbed particle p, with so much of its frame left: it stays where and as fast as it is."""
+    """Book that a wall absorbs particle p with so much of its frame left; it keeps its place and velocity."""
     absorbed = share.state.absorbed
     absorbed.time[p], absorbed.wall[p] = share.moment - remaining, np.int32(wall)
 
 
 def detain(share, p, wall, remaining, wait):
-    """Whether particle p goes on in this frame after a wait at a wall; else it is absorbed, or waits longer."""
+    """Whether particle p goes on in this frame after a wait at a wall; else book its absorption or its later start."""
     if wait < remaining:
         return True
     if wait == math.inf:
@@ -45,7 +45,7 @@ def detain(share, p, wall, remaining, wait):
 
 
 def meet_openings(openings, method, walls, gravity, share, lanes, live):
-    """The lanes at openings, at the end of their flights."""
+    """Handle the lanes that are at openings at the end of their flights."""
     if method.steps_into_walls:
         face_lanes(openings, method, walls, gravity, share, lanes, live)
     else:
@@ -53,9 +53,9 @@ def meet_openings(openings, method, walls, gravity, share, lanes, live):
 
 
 def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
-    """The lanes with a flight that has ended on a wall where it is open, if no closed one is at the same place.
+    """Let lanes out that have flown to a wall where it is open, if no closed wall is at the same place.
 
-    Where another room is on its other side a lane is in that, and its flight goes on in the next pass.
+    A lane with another room behind the wall goes into that room, and its flight goes on in the next pass.
     """
     near = closeness(walls)
     for i in range(index(live)):
@@ -81,11 +81,11 @@ def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
         flier.remaining, lanes.wall[i] = 0.0, -1.0
 
 
-# --- Of steps into walls ---------------------------------------------------------------------------------
+# --- Steps into walls ------------------------------------------------------------------------------------
 
 
 def face_lanes(openings, method, walls, gravity, share, lanes, live):
-    """Find to which lanes which walls are open in their steps, by the foot of each on the wall at the start of it."""
+    """Set which walls are open to each lane in its step: those open at its foot on them at the start of the step."""
     for i in range(index(live)):
         for k, _wall in enumerate(walls.each):
             lanes.stand[k, i] = 1.0
@@ -100,7 +100,7 @@ def _face(openings, method, walls, gravity, share, lanes, i):
     for k, wall in enumerate(now.each):
         if lets_out(openings, method, now, float(k), wall.project(lane.r), near):
             lanes.stand[k, i], some_open = 0.0, True
-            # What it has stored is lost with the wall.
+            # The energy that the contact has stored is lost.
             lost += method.law.stored_energy(wall.gap_of(wall.inner(lane.r)))
     if some_open:
         _lose(method, share, lanes, i, lost)
@@ -108,7 +108,7 @@ def _face(openings, method, walls, gravity, share, lanes, i):
 
 
 def _lose(method, share, lanes, i, lost):
-    """Take energy from a lane [J], for ever."""
+    """Book a loss of energy [J] of a lane."""
     state, p = share.state, index(lanes.particle[i])
     state.dissipated[p] += lost
     lane = lanes.lane(i)
@@ -119,7 +119,7 @@ def _lose(method, share, lanes, i, lost):
 
 
 def step_out_lanes(method, walls, share, lanes, live):
-    """The lanes that have stepped through an open wall: whether any has."""
+    """Let lanes out that have stepped through an open wall; whether there was one."""
     found = False
     if lanes.stand is None:
         return found
@@ -132,7 +132,7 @@ def step_out_lanes(method, walls, share, lanes, live):
 
 @outlined
 def step_out(method, walls, share, lanes, i):
-    """A lane after its step: whether it is through an open wall; then what it has stored in others is lost."""
+    """Let a lane out if it has stepped through an open wall; whether it has. Energy stored in other walls is lost."""
     flier, out = lanes.lane(i), -1.0
     for k, wall in enumerate(method.at_start(walls, flier.remaining).each):
         if lanes.stand[k, i] == 0.0 and wall.level_of(wall.inner(flier.r)) > 0.0:
@@ -151,12 +151,12 @@ def step_out(method, walls, share, lanes, i):
     return True
 
 
-# --- Of what slides --------------------------------------------------------------------------------------
+# --- Particles that slide --------------------------------------------------------------------------------
 
 
 @outlined
 def is_at_opening(slide, now, i):
-    """Whether a lane that slides is where a wall that holds it is open: it is at that wall then, as if it flew."""
+    """Whether a lane that slides is where a wall that holds it is open; then it is put there as after a flight."""
     lanes, lane = slide.lanes, slide.lanes.lane(i)
     near = crossing.near(slide.method, lane.r)
     wall = open_wall_of(lanes.openings, slide.method, now, slide.active(lane), lane.r, near)
@@ -170,7 +170,7 @@ def is_at_opening(slide, now, i):
 
 @outlined
 def let_out(walls, gravity, share, i, wall, r, v, remaining):
-    """Particle i escapes through an open wall, or flies into the room behind it with the speed that it has kept."""
+    """Let particle i escape through an open wall, or fly into the room behind it with its kept speed."""
     state, contacts = share.state, share.state.contacts
     if not leads_on(walls, wall, r):
         escape(share, i, wall, r, v, remaining)
@@ -191,7 +191,7 @@ def let_out(walls, gravity, share, i, wall, r, v, remaining):
 
 
 def end_frame(share, i):
-    """Nothing is left of the frame of particle i, which no wall holds."""
+    """End the frame of particle i, which no wall holds."""
     contacts = share.state.contacts
     contacts.remaining[i], contacts.keep[i] = 0.0, 0.0
     contacts.walls[0, i], contacts.walls[1, i] = -1.0, -1.0

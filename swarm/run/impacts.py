@@ -1,4 +1,4 @@
-"""The log of impacts of a run: kernels fill arrays in turn, and the thread that writes frames writes these too."""
+"""The log of impacts of a run: kernels fill arrays, which the thread that writes frames writes too."""
 
 import queue
 import threading
@@ -18,10 +18,10 @@ from ..lanes.watching.log import GOING, Log
 from ..lanes.watching.watchers import Watchers
 from .options import RunOptions, Task
 
-# Rows of one log, and how many logs there are besides the two of each thread: one is written while others are filled.
-# They bound the memory: 6 MB each. With a quarter of the rows a row takes the writer twice as long.
+# The rows of one log, and the number of logs besides two for each thread: some are written while others are filled. A
+# log takes 6 MB. With a quarter of the rows the writer takes twice as long for a row.
 _ROWS, _MORE = 1 << 16, 2
-# So few rows are copied, so that their log can be filled again at once.
+# Rows up to this number are copied, so that their log can be filled again at once.
 _FEW = _ROWS // 16
 # A thread that waits for an empty log looks so often whether the run has ended [s].
 _GLANCE = 0.1
@@ -33,11 +33,11 @@ class Impacts:
     """The logs that the threads of a run fill; a log that is full is written while they fill others.
 
     Args:
-        compiled: what is run.
-        n: how many particles.
-        particles: "all", k for every k-th one, or the numbers of those with logged impacts.
+        compiled: the scene.
+        n: the number of particles.
+        particles: the particles with logged impacts: "all", k for every k-th one, or their numbers.
         precision: of positions, velocities and impulses; times are float64.
-        threads: how many fill logs.
+        threads: the number of threads that fill logs.
         counts: whether crossings of counters have rows too.
         meet: whether particles meet one another.
         lasts: whether contacts take time.
@@ -45,11 +45,11 @@ class Impacts:
     Attributes:
         kept: the particles and the precision, as TOML text.
         begin: the start of the frame that is computed [s].
-        total: rows so far.
-        ends: frame -> rows at its end, until the writer takes them.
-        write: adds rows to the file; the writer sets it.
-        sums: the checksums of the rows of the frame under way, as text; the writer sets it.
-        queue: what has a thread call a function in its turn among the frames; the writer's thread sets it.
+        total: the number of rows so far.
+        ends: frame -> the number of rows at its end, until the writer takes it.
+        write: a function that adds rows to the file; the writer sets it.
+        sums: a function that returns the checksums of the rows of the frame under way, as text; the writer sets it.
+        queue: a function that has the writer's thread call a function, in its turn among the frames.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Impacts:
             return log._replace(begin=self.begin, end=end)
 
     def hand_over(self, log: Log) -> None:
-        """Have what is in a log written, and the log filled again."""
+        """Queue the rows of a log to be written, and the log to be filled again."""
         count = int(log.filled[0])
         rows, written = _columns(log, count), log if count > _FEW else None
         with self._counting:
@@ -142,7 +142,7 @@ class Impacts:
                 self._spare.put(log)
 
     def close(self) -> None:
-        """No thread waits for an empty log from now on."""
+        """Let no thread wait for an empty log from now on."""
         self._over = True
 
 
@@ -163,7 +163,7 @@ class ThreadLog:
     """The log that one thread fills.
 
     Attributes:
-        log: the one that is filled now.
+        log: the log that is being filled.
     """
 
     def __init__(self, impacts: Impacts, end: float) -> None:
@@ -188,12 +188,12 @@ class ThreadLog:
         return watchers._replace(log=self.log)
 
     def turn(self) -> None:
-        """Hand over what there is, and go on with an empty log."""
+        """Hand over the rows so far, and go on with an empty log."""
         self.close()
         self.log = self._impacts.empty(self._end)
 
     def close(self) -> None:
-        """Hand over what there is."""
+        """Hand over the rows so far."""
         if self.log.filled[1]:
             raise RunError(
                 f"the frame at {self._end:g} s has flights that cross counters more often, or steps in which more "
@@ -204,7 +204,7 @@ class ThreadLog:
 
 
 def require_logged(n: int, options: RunOptions) -> None:
-    """Raise a `SceneError` where impacts are asked for of particles, or bodies, that are not there."""
+    """Raise a `SceneError` where `impact_particles` has the number of a particle, or body, that does not exist."""
     numbers = options.impact_particles
     if isinstance(numbers, tuple) and numbers[-1] >= n:
         raise SceneError(f"impact_particles must be numbers of particles, from 0 to {n - 1}, got {numbers[-1]}")
