@@ -1,4 +1,4 @@
-"""The scene as kernels take it: its walls by their kinds, with their laws and openings, and all numberings of walls."""
+"""The scene for kernels: its walls by their kinds, their laws and openings, and all numberings of walls."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -28,7 +28,7 @@ from .surfaces.walls import Field, Listed, Walls, all_walls
 if TYPE_CHECKING:
     from .scene import Scene
 
-# Most walls that kernels are compiled for: 24 with `contact_step` take three minutes.
+# The most walls that kernels are compiled for: with `contact_step` this many take three minutes.
 MOST_WALLS = 24
 # The `apart` of a scene in which impacts move a wall: each listed solid is a wall.
 REACTING = "walls that react"
@@ -39,7 +39,7 @@ _NO_HEAT = Thermal(0.0, 0.0)
 
 
 class PartsOfRows(NamedTuple):
-    """The part that each row of a scene belongs to, `number` where its surface has none; how many parts there are."""
+    """The part of each row, which is `number` where its surface has no parts; and the number of parts."""
 
     rows: tuple[int, ...]
     number: int
@@ -177,24 +177,24 @@ class CompiledScene:
         return None if laws == NONE else laws.in_plane(self.scene.across())
 
     def lawful(self) -> list[Surface]:
-        """What says the laws of each wall."""
+        """The surface that has the laws, for each wall."""
         runs = [run for i, walls in self._spans for run in self.pieces.each[i].runs(walls)]
         return [surface for surface, walls in runs for _wall in range(walls)]
 
     def openings(self, moment: float = 0.0, some: list[tuple[int, int]] | None = None) -> tuple[Opened, ...] | None:
         """The openings of the walls in the frame that ends at a moment [s], or None.
 
-        Of all walls, or of some in a row that are given as (piece, walls).
+        They are those of all walls, or of `some`, consecutive ones: (piece, number of walls) each.
         """
         spans, volumes, doorways = self._spans if some is None else some, self.pieces.volumes, self.pieces.doorways
         if self.largest is None:
             return openings_in(spans, (volumes, doorways), moment) or None
-        # Balls meet no rooms that a door could be between: it opens nothing, and files have the times of escapes.
+        # Balls meet a union as one surface, so doors between its rooms open nothing; files still have times of escapes.
         made = openings_in(spans, (volumes, ((),) * len(volumes)), moment)
         return made if made or any(doorways) else None
 
     def walls(self, moment: float = 0.0) -> Walls:
-        """The walls by their kinds, in the frame, or its piece, that ends at a moment [s]."""
+        """The walls by their kinds, in the frame, or the piece of one, that ends at a moment [s]."""
         if self.scene.moves():
             return self._made(moment)
         there = tuple(was_there(piece.present, moment) for piece in self.pieces.each)
@@ -203,12 +203,12 @@ class CompiledScene:
         return self._known[there]
 
     def walls_of_bodies(self, own: Sequence[Surface], moment: float = 0.0) -> Walls:
-        """The walls for bodies at a moment, as `walls`, and those of a body's own surfaces, at rest, after them."""
+        """The walls for bodies at a moment [s]: those of `walls`, then those of the surfaces of a body, at rest."""
         return self._made(moment, own)
 
     @cached_property
     def of_no_mass(self) -> "CompiledScene | None":
-        """The scene of the surfaces that impacts do not move, None where impacts move all."""
+        """The scene of the surfaces that impacts do not move; None where impacts move all of them."""
         scene = self.scene
         rest = [surface for surface in scene.surfaces if not surface.reacts()]
         made = type(scene)(rest, scene.gravity, plane=scene.plane) if rest else None
@@ -244,7 +244,7 @@ class CompiledScene:
         return [self.pieces.each[i] for i in numbers]
 
     def _made(self, moment: float, own: Sequence[Surface] | None = None) -> Walls:
-        """The walls for particles; with surfaces of their own for bodies."""
+        """The walls for particles or, with the surfaces of a body, for bodies."""
         scene, order, fields = self.scene, self.order, self._pieces_at(self.order.fields)
         straight = scene.gravity is None and own is None
 
@@ -270,14 +270,14 @@ class CompiledScene:
 
 
 def _of_walls(values: list[Any], spans: list[tuple[int, int]], neutral: Any) -> tuple[Any, ...] | None:
-    """The value of every wall, of which so many in a row have one of these; None where all are neutral."""
+    """The value of every wall, from values and spans (value, number of walls); None where all are neutral."""
     if all(value == neutral for value in values):
         return None
     return tuple(values[k] if walls == 1 else Span(values[k], float(walls)) for k, walls in spans)
 
 
 def _thermal(surface: Surface) -> Thermal:
-    """The temperature and the accommodation of a surface as kernels take them."""
+    """The temperature and the accommodation of a surface, for kernels."""
     if surface.temperature is None:
         return _NO_HEAT
     return Thermal(surface.temperature, surface.accommodation)

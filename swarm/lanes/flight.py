@@ -1,4 +1,4 @@
-"""A flight of every lane of a block: to its next contact, or to the end of the frame."""
+"""The flight of every lane of a block to its next contact, or to the end of the frame."""
 
 import numpy as np
 
@@ -17,9 +17,9 @@ from .lane_arrays import Flying
 from .periodic import cut_steps
 from .table import EIGHT, STRIDE, LaneView, Rows, copy_lane, marked_lanes
 
-# Safe steps to walls in any motion that all lanes take in a pass after the first.
+# After the first safe step to walls in any motion all lanes take so many more in a pass.
 _STRIDES = 3
-# Guesses are improved in all lanes together if more than one in so many needs it.
+# Guesses are improved in all lanes together if at least one lane in so many needs it.
 _MANY = 8
 
 
@@ -34,7 +34,7 @@ class Open(LaneView):
 
 
 def go(method, walls, gravity, lanes, live):
-    """Every lane to its next contact, or to the end of the frame.
+    """Fly every lane to its next contact, or to the end of the frame.
 
     A shorter loop has more lanes under way in a processor, a longer one writes less. Measured in a sphere, nanoseconds
     an impact: first hit, flight and contact in one loop 7.2, a loop for each 5.2; now that there is less to do, flight
@@ -95,7 +95,7 @@ def _fly_beside(method, walls, gravity, lanes, some):
 
 
 def _search(met, walls, gravity, lanes, live):
-    """First hits with fields and by safe steps, each in a loop of its own."""
+    """Find first hits with fields and by safe steps, in separate loops."""
     if met is None:
         return
     if _has_fields(met):
@@ -140,7 +140,7 @@ def _leaps(met):
 
 
 def _leap(walls, gravity, lanes, live):
-    """Every lane to its first hit with walls in no field, and from there with the fields."""
+    """Find the first hit of every lane with walls in no field, then with the fields."""
     free, before = walls.others(), walls.count_in_fields()
     for i in range(index(live)):
         lane = lanes.lane(i)

@@ -19,7 +19,7 @@ def _nearest_lid(scene: Scene, surface: Surface) -> float:
 def require_shapes(scene: Scene, radius: Floats) -> None:
     """Raise a `SceneError` where balls with these radii may not meet a surface of the scene."""
     for i, surface in enumerate(scene.surfaces):
-        why = surface.holds_balls()
+        why = surface.why_no_balls()
         if why is not None:
             raise SceneError(
                 f"surfaces[{i}] must be one that particles with a radius may meet, got {type(surface).__name__}, "

@@ -11,8 +11,7 @@ from .presence.openings import reaches, volumes_of
 from .surface import Surface, volume_of
 from .union import Place, nodes_of
 
-# Of the extent of what kernels take as unions, how far rooms with a face in common overlap: more than what counts as
-# touching a wall.
+# Rooms with a face in common overlap by this part of the extent of the unions: more than counts as touching a wall.
 _REACH = 1e-9
 
 Images = tuple[tuple[Surface, ...], ...]
@@ -23,8 +22,8 @@ class Pieces:
     """The simple surfaces of a scene: its surfaces without parts, the parts of others, and the images of both.
 
     Attributes:
-        images: of every surface what of it reaches into the cell; itself alone where nothing repeats.
-        each: the pieces, of one image after the other.
+        images: the images of every surface that reach into the cell; where nothing repeats the surface itself.
+        each: the pieces, image by image.
         owners: the number of the surface that each piece is, or is a part or an image of.
         places: the place of each piece in that surface, () where it has no parts.
         volumes: the volumes in which each piece is open.
@@ -72,7 +71,7 @@ class Pieces:
 
 
 def pieces_of(surfaces: Sequence[Surface], period: Lengths | None, largest: float = 0.0) -> Pieces:
-    """The pieces that particles in the cell meet; they are points, or balls with radii up to the largest one [m].
+    """The pieces that particles in the cell meet: points, or balls with radii up to the largest one [m].
 
     Raises:
         SceneError: a surface does not go with the period, or an opening does not reach the wall that it opens.
@@ -98,7 +97,7 @@ def pieces_of(surfaces: Sequence[Surface], period: Lengths | None, largest: floa
 
 
 def differing_in(union: Surface) -> str | None:
-    """What the parts of a union do not have in common, by the name of the argument; None: all of it is the same."""
+    """The name of an argument in which the parts of a union differ; None if they agree in all."""
     surfaces = union.surfaces()
     from .fields.soft_rooms import IN_COMMON  # loaded where rooms are joined
 

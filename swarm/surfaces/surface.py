@@ -146,18 +146,18 @@ class Surface(Validated):
         raise NotImplementedError
 
     def walls(self) -> tuple[Any, ...]:
-        """As kernels take it: one record for a smooth surface, one for each smooth part of a cavity with edges."""
+        """The records that kernels take: one for a smooth surface, one for each smooth part of a cavity with edges."""
         return (rotations.rotated(self.rotation, self.numbers()),)
 
     def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
-        """As many walls, in the same order, as kernels take them where particles are balls: each has a `grown`.
+        """The records that kernels take for balls, as many as `walls` and in their order; each has a `grown`.
 
-        No radius of a ball is above the `largest` [m].
+        No radius of a ball is above `largest` [m].
         """
         return self.walls()
 
-    def holds_balls(self) -> str | None:
-        """None where balls may meet the surface, else half a sentence that says why they may not."""
+    def why_no_balls(self) -> str | None:
+        """Why balls cannot meet the surface, for the sentence of an error; None where they can."""
         if all(getattr(wall, "holds_balls", False) for wall in self.walls_of_balls(0.0)):
             return None
         return "of which the parallel surface is not known"
@@ -167,11 +167,11 @@ class Surface(Validated):
         return math.inf
 
     def most_bent_at(self) -> Vector | None:
-        """Where on the surface that radius is, None where it is not looked for."""
+        """The point of the surface with that radius; None where it is not computed."""
         return None
 
     def open_volumes(self, between: bool = False) -> tuple["Surface", ...]:
-        """The volumes of its openings, each present while that is open: those of walls between rooms, or others."""
+        """The volumes of its openings, `present` while these are open: those `between` rooms, or all others."""
         return tuple(volume_of(one) for one in self.openings if (isinstance(one, Opening) and one.between) == between)
 
     def is_there(self, time: float) -> bool:
@@ -183,11 +183,11 @@ class Surface(Validated):
         return self.mass is not None or self.inertia is not None
 
     def at_rest(self) -> "Surface":
-        """The same that nothing moves."""
+        """The surface without motion and mass, where it is given."""
         return self if self.motion is None else replace(self, motion=None, mass=None, inertia=None)
 
     def own_center(self) -> Vector:
-        """The centre in the surface's own frame, which is turned about the origin."""
+        """The centre in the frame in which the surface is not rotated; both frames have the same origin."""
         return rotations.turned_back(self.rotation, self.center)  # type: ignore[attr-defined]
 
     def size(self) -> float:
@@ -195,58 +195,58 @@ class Surface(Validated):
         raise NotImplementedError
 
     def bounds(self) -> Box:
-        """A box (lower, upper) that holds the admissible side; infinite where that side is open."""
+        """A box (lower, upper) around the admissible side; infinite where that side is open."""
         raise NotImplementedError
 
     def half_spaces(self) -> list[HalfSpace]:
-        """Half-spaces n.r <= offset that hold the admissible side, where they say more than `bounds`."""
+        """Half-spaces n.r <= offset around the admissible side that are tighter than `bounds`."""
         return []
 
     def open_faces(self) -> list[HalfSpace]:
-        """The faces at which the surface ends without a wall: (n, offset), beyond it is n.r > offset."""
+        """The faces (n, offset) at which the surface ends without a wall; n.r > offset is beyond one."""
         return []
 
     def known_in(self) -> Box | None:
-        """The box that particles must not leave, for outside of it the surface is not known; None: it is everywhere."""
+        """The box in which the surface is defined, and particles must stay; None: it is defined everywhere."""
         return None
 
     def shifted(self, shift: Vector) -> "Surface":
-        """The same surface elsewhere."""
+        """The surface moved by a shift [m]."""
         x, y, z = (a + b for a, b in zip(self.center, shift, strict=True))  # type: ignore[attr-defined]
         return replace(self, center=(x, y, z))  # type: ignore[call-arg]
 
     def turned(self, turn: rotations.Quaternion) -> "Surface":
-        """The same surface, with its openings, rotated about the origin."""
+        """The surface, with its openings, rotated about the origin."""
         given: dict[str, Any] = {"rotation": rotations.after(turn, self.rotation)}
         if hasattr(self, "center"):
             given["center"] = rotations.turned(turn, self.center)
         return replace(self, **given, openings=tuple(_turned_opening(one, turn) for one in self.openings))
 
     def is_solid(self) -> bool:
-        """Whether particles are kept out of it rather than in it."""
+        """Whether the outside is admissible: particles are kept out of it."""
         return getattr(self, "side", "inside") == "outside"
 
     def require_compiled(self) -> None:
-        """Raise a `SceneError` where Numba cannot compile a function of its user: sooner than in a kernel."""
+        """Raise a `SceneError` if Numba cannot compile a user-defined function, before a kernel needs it."""
 
     # Whether the inner side is convex: then nothing of it is on the other side of its wall.
     is_convex = False
-    # Whether it is many bodies, or sides, of one kind, which kernels take as one field.
+    # Whether it has many bodies, or sides, of one kind, which kernels take as one field.
     is_field = False
-    # Of a field, whether kernels take it as one wall, into which points go.
+    # Whether kernels take a field as one soft wall.
     is_one_wall = False
-    # Of walls that are faces between edges, what one of them is called.
+    # The noun for one of its faces, if its walls are faces between edges.
     face_noun: ClassVar[str] = ""
     # Whether a solid of it has edges, and whether its wall may have a point without a normal.
     has_edges = False
     may_have_tip = False
-    # What is called so: a cavity of it, a solid of it, and either of them in a plane. None: what its class is called.
+    # The nouns for a cavity, a solid, and both in a plane; None: the name of the class.
     nouns: ClassVar[tuple[str, str, str, str] | None] = None
-    # Of a union or an intersection, its parts; of a mesh, the laws of its groups.
+    # The parts of a union or an intersection; the laws of the groups of a mesh.
     parts = tuple["Surface", ...]()
     groups = None
 
-    # --- What it is made of: itself, where it has no parts and is not many bodies ---
+    # --- Parts and bodies: the surface itself where it has none ---
 
     @property
     def rooms(self) -> tuple[tuple["Surface", ...], ...]:
@@ -258,35 +258,35 @@ class Surface(Validated):
         return (self,)
 
     def places(self) -> tuple[Place, ...]:
-        """Of each of the `surfaces` the part that it is: its number, and of a part of a part both."""
+        """For each of the `surfaces` the place of its part: its number, or for a part of a part the numbers of both."""
         return ((),)
 
     def places_of_parts(self) -> tuple[Place, ...]:
-        """The same of every part, in their order."""
+        """The places of all parts, in order."""
         return ()
 
     def moving_apart(self) -> list[tuple["Surface", "Surface"]]:
-        """The surfaces of its rooms that have a face in common at the start, of which each has a motion of its own."""
+        """Pairs of surfaces of its rooms that have a face in common at the start and different motions."""
         return []
 
     def common_places(self) -> list[tuple[Place, Place]]:
-        """The places of the parts that have a face in common, two by two."""
+        """Pairs of places of parts that have a face in common."""
         return []
 
     def reaching(self, reach: float) -> "Surface":
-        """The same with rooms that overlap by so much [m] where they have a face in common; itself where none have."""
+        """The surface with rooms that overlap by so much [m] where they have a face in common."""
         return self
 
     def runs(self, walls: int) -> list[tuple["Surface", int]]:
-        """Walls in a row that have the same laws, of all of its walls: (what says them, how many)."""
+        """Its walls in runs with the same laws: (the surface that has the laws, the number of walls)."""
         return [(self, walls)]
 
     def solids(self) -> list["Surface"]:
-        """Every body as a surface of its own."""
+        """Every body as a separate surface."""
         return [self]
 
     def as_one_wall(self) -> "Surface":
-        """The surface as soft walls take it: a field as one wall."""
+        """The surface for soft walls: a field, or a union of several rooms, is one wall."""
         return self
 
     def body_count(self) -> int:
@@ -294,35 +294,35 @@ class Surface(Validated):
         return 0
 
     def wall_count(self, of_balls: bool) -> int:
-        """The number of walls that points meet, or balls; of a field with all its members."""
+        """The number of walls that points, or balls, meet, with all members of a field."""
         return len(self.walls())
 
     def faces_of_balls(self, largest: float) -> tuple[Any, NDArray[Any]]:
-        """What soft balls with radii up to the largest one [m] meet, and of each member the number of its face.
+        """(the members that soft balls with radii up to the largest one [m] meet, the face of each member).
 
-        Of a field or a mesh. A face is what a ball touches at one place only: a body, or what joins without a corner
-        around the balls.
+        For a field or a mesh. A ball touches a face at one place only: a face is a body, or members that join without a
+        corner around the balls.
         """
         raise NotImplementedError
 
     def rooms_of_balls(self) -> "tuple[Any, ...]":
-        """Its rooms as balls know them, each of the surfaces around it."""
+        """The rooms that balls meet: for each the surfaces around it."""
         return self.rooms
 
     def is_foam(self) -> bool:
-        """Whether particles live in any of many bodies, not outside of all."""
+        """Whether particles are inside of many bodies, not outside of them."""
         return False
 
-    # --- How it is drawn, and how points are drawn from it ---
+    # --- Pictures, and random points ---
 
     def enclosing_box(self) -> Box:
-        """A box (lower, upper) that holds the surface, a solid as well as a cavity; infinite where none is known."""
+        """A box (lower, upper) around a solid or a cavity; infinite where it is unbounded."""
         return (replace(self, side="inside") if self.is_solid() else self).bounds()  # type: ignore[call-arg]
 
     def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
-        """What points uniform in its area are drawn from, as far as it is within the bounds (lower, upper).
+        """The sampler of points that are uniform in its area within the bounds (lower, upper).
 
-        With an axis `across` a plane, uniform in its length in that plane.
+        With the axis `across` a plane they are uniform in its length in that plane.
 
         Raises:
             SceneError: points of this kind of surface cannot be drawn, or the surface is not bounded.
@@ -330,14 +330,14 @@ class Surface(Validated):
         return list(by_lines(self, bounds, across))
 
     def filled(self) -> "Surface":
-        """What a solid fills, as a cavity; a cavity itself."""
+        """A solid as the cavity of the same shape; a cavity itself."""
         try:
             return replace(self, side="inside") if self.is_solid() else self  # type: ignore[call-arg]
         except SceneError:
             return self
 
     def level_sets(self) -> list[LevelSet]:
-        """The level set of every smooth wall, in order; of a solid with edges those of what it fills."""
+        """The level set of every smooth wall, in order; for a solid with edges those of the cavity of its shape."""
         whole = self.filled()
         if type(whole).phi is not Surface.phi:
             still = whole.at_rest()
@@ -345,7 +345,7 @@ class Surface(Validated):
         return [_level_set(wall) for wall in whole.walls()]
 
     def own_frame(self) -> tuple[NDArray[np.float64], dict[str, Any]]:
-        """The axes along which it is given, columns of a matrix, and its arguments other than places in that frame."""
+        """(the axes of the frame in which it is given, as columns, the arguments that differ in that frame)."""
         return rotations.matrix(self.rotation), {}
 
     def triangulated(
@@ -376,11 +376,11 @@ class Surface(Validated):
     # --- In words ---
 
     def beyond(self) -> str:
-        """Where a point is that is not on the admissible side."""
+        """The word for the side that is not admissible."""
         return "inside" if self.is_solid() else "outside"
 
     def admissible(self, phi: float) -> str:
-        """Which side is admissible, and that a point with this phi is not on it."""
+        """The text that says which side is admissible, for a point with this phi that is on the other one."""
         if self.is_solid():
             return f"admissible is its outside, where phi is 0 or more, and phi = {phi:.6g} there"
         return f"admissible is its inside, where phi is 0 or less, and phi = {phi:.6g} there"
@@ -395,11 +395,11 @@ class Surface(Validated):
         ]
 
     def may_be_passed(self) -> bool:
-        """Whether its wall has two sides that particles may be on, as a solid, or a cavity with a bay, has."""
+        """Whether particles may be on both sides of its wall, as beside a solid or in a cavity that is not convex."""
         return self.is_solid() or not self.is_convex
 
     def extent(self) -> float:
-        """Distance from the origin within which the surface, or what is particular about it, lies [m]."""
+        """The distance from the origin within which the surface lies [m]; of an unbounded one its particular points."""
         raise NotImplementedError
 
     def is_unturned_by(self, axis: Vector, center: Vector) -> bool:
@@ -407,7 +407,7 @@ class Surface(Validated):
         return False
 
     def turning_center(self, axis: Vector) -> Vector | None:
-        """A point through which that is so, of one that another rotation about this axis carries along a circle."""
+        """A centre about which a rotation about this axis leaves the surface where it is; None without one."""
         center: Vector | None = getattr(self, "center", None)
         return center if center is not None and self.is_unturned_by(axis, center) else None
 

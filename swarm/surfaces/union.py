@@ -179,12 +179,12 @@ class Joined(Surface):
 
         return soft_rooms(self)
 
-    def holds_balls(self) -> str | None:
+    def why_no_balls(self) -> str | None:
         if len(self.rooms) > 1:
             from .balls.joined_rooms import why_no_balls_in  # loaded where balls are
 
             return why_no_balls_in(self)
-        whys = ((surface, surface.holds_balls()) for surface in self.surfaces())
+        whys = ((surface, surface.why_no_balls()) for surface in self.surfaces())
         return next((f"with a {type(surface).__name__}, {why}" for surface, why in whys if why is not None), None)
 
     def largest_ball(self) -> float:

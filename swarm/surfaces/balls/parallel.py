@@ -37,7 +37,7 @@ class Parallel(Surface):
     def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
         return (self.framed_alike(self.by_foot(largest)),)
 
-    def holds_balls(self) -> str | None:
+    def why_no_balls(self) -> str | None:
         radius, where = self.tightest()
         if radius > 0.0 or where is None:
             return None

@@ -185,12 +185,12 @@ class Many(Surface):
         (members,) = self.walls_of_balls(largest)
         return members, np.arange(len(members.table))
 
-    def holds_balls(self) -> str | None:
+    def why_no_balls(self) -> str | None:
         if self.is_foam():
             from ..balls.joined_rooms import why_no_balls_in  # loaded where balls are
 
             return why_no_balls_in(self)
-        return self.solids()[0].holds_balls()
+        return self.solids()[0].why_no_balls()
 
     def contain(self, points: Floats) -> NDArray[np.bool_]:
         """Whether each of the points (3, N) is in a body: cheaper than phi, which asks for the nearest one."""

@@ -286,7 +286,7 @@ class Outlined(Many):
     def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
         return np.asarray(side_sign(self.side) * self.phi(points, time) + radius)
 
-    def holds_balls(self) -> str | None:
+    def why_no_balls(self) -> str | None:
         return None
 
     def _boxes(self) -> tuple[Floats, Floats]:
