@@ -190,7 +190,7 @@ class Background:
                 end.set()
 
     def _gather(self) -> tuple[list[Written], object]:
-        """(the next batch of frames, what ended it: None at the end of the run, an event, or True)."""
+        """The next batch of frames, and what ended it: None at the end of the run, an event, or True."""
         frames: list[Written] = []
         frame, latest = self._frames.get(), math.inf
         while frame is not None and not isinstance(frame, threading.Event):

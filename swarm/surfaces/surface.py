@@ -345,7 +345,7 @@ class Surface(Validated):
         return [_level_set(wall) for wall in whole.walls()]
 
     def own_frame(self) -> tuple[NDArray[np.float64], dict[str, Any]]:
-        """(the axes of the frame in which it is given, as columns, the arguments that differ in that frame)."""
+        """The axes of its own frame, columns of a matrix; and the arguments that differ in that frame."""
         return rotations.matrix(self.rotation), {}
 
     def triangulated(

@@ -170,7 +170,7 @@ def _each(room: Any) -> Iterator[tuple[Surface, Any]]:
 
 
 def _bend_of(surface: Surface, wall: Any) -> tuple[float | None, float]:
-    """(the radius of curvature of a wall [m], None for a cone, how fast it changes along the wall)."""
+    """The radius of curvature of a wall [m], None for a cone; and how fast it changes along the wall."""
     if isinstance(surface, (Sphere, Cylinder)) and not isinstance(wall, FLAT):
         return surface.radius, 0.0
     if isinstance(surface, Cone) and not isinstance(wall, TipPlane):

@@ -162,7 +162,7 @@ class PolynomialFlight(Record):
         return c, c + 0.25 * q1, c + 0.5 * q1 + (1.0 / 6.0) * q2, c + 0.75 * q1 + 0.5 * q2 + 0.25 * q3
 
     def next_step(self, t, last):
-        """One step towards the first root: (t, its length, 0 if it is the last), as those of `course.Fall`."""
+        """One step towards the first root, as those of `course.Fall`: (t, its length or 0 if it is the last)."""
         s = t if self.since is None else t - self.since
         c, b, a2, a3, a4, _window = Quartic(self.c, self.b, self.a2, self.a3, self.a4, 0.0).moved(s)
         # Where neither of the higher terms rises, the parabola is above the level for ever.
