@@ -7,7 +7,11 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import pytest
+
 import swarm
+
+pytestmark = pytest.mark.quick
 
 # Calls of Python functions from `simulate` to the first step of twenty particles in a sphere, at most, and of how many
 # functions by name: 250, and some that differ between versions of Python and NumPy.

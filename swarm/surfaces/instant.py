@@ -1,5 +1,6 @@
 """Surfaces at an instant: their gaps at points, what holds their admissible sides, and whether these have any room."""
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -116,3 +117,10 @@ def has_room(
         # Where normals are all but parallel and the volumes are apart, the step leads far away.
         points = np.clip(points - (np.linalg.pinv(normals) @ wanted)[:, :, 0].T, 2.0 * low - high, 2.0 * high - low)
     return False
+
+
+def are_there_together(one: Surface, other: Surface) -> bool:
+    """Whether there is a time at which both surfaces are present."""
+    always = ((0.0, math.inf),)
+    pairs = itertools.product(one.present or always, other.present or always)
+    return any(max(begins) < min(ends) for begins, ends in (zip(*pair, strict=True) for pair in pairs))

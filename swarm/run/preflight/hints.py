@@ -11,8 +11,7 @@ from ...compiled_scene import CompiledScene
 from ...kernel.limits import EPSILON
 from ...methods import Impact
 from ...scene import Scene
-from ...surfaces.instant import box_of, gaps_of, side_of
-from ...surfaces.presence.flush import are_there_together, pairs_in_one_place, standing
+from ...surfaces.instant import are_there_together, box_of, gaps_of, side_of
 from ...surfaces.presence.openings import least_distance
 from ...surfaces.surface import Surface
 from ..options import Task
@@ -237,8 +236,9 @@ def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
         of_points: whether points meet its walls. Balls do not fit into a gap of no width.
     """
     surfaces, size = scene.surfaces, scene.extent() or 1.0
-    if len(surfaces) > _COMPARED:
+    if not 1 < len(surfaces) <= _COMPARED:
         return
+    from ...surfaces.presence.flush import pairs_in_one_place, standing  # loaded where there are two walls
 
     def matters(one: Surface, other: Surface, are_back_to_back: bool) -> bool:
         return of_points and (one.is_solid() or other.is_solid()) if are_back_to_back else _differ(one, other)

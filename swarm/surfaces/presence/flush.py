@@ -5,8 +5,6 @@ a solid that lies within what other walls keep from particles is moved into that
 the common faces of rooms are in `seams`: what particles may be in does not change.
 """
 
-import itertools
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -14,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...state import Floats
-from ..instant import distances, side_of
+from ..instant import are_there_together, distances, side_of
 from ..surface import Surface
 from .seams import ENOUGH, FAR, OUTSIDE, PLACES, Face, faces_of
 
@@ -153,10 +151,3 @@ def _share_a_place(one: Surface, other: Surface, face: Face, size: float) -> boo
 def _filled(surface: Surface) -> Surface:
     """The surface at rest, with the inside as its admissible side."""
     return replace(surface.at_rest(), side="inside") if surface.is_solid() else surface.at_rest()  # type: ignore[call-arg]
-
-
-def are_there_together(one: Surface, other: Surface) -> bool:
-    """Whether there is a time at which both surfaces are present."""
-    always = ((0.0, math.inf),)
-    pairs = itertools.product(one.present or always, other.present or always)
-    return any(max(begins) < min(ends) for begins, ends in (zip(*pair, strict=True) for pair in pairs))
