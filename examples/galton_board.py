@@ -20,8 +20,9 @@ import swarm
 from .asked import Asked
 from .page import page, solid
 
-# Distance of pegs and of rows, radius of a peg with a grain, depth of the bins, half the thickness of a divider [m].
-ROWS, SPACING, RADIUS, DEPTH, DIVIDER = 12, 0.02, 0.006, 0.08, 0.0008
+# Distance of pegs and of rows, radius of a peg with a grain, depth of the bins, half the thickness of a divider, and
+# how far it goes on into floor and glass, so that no grain gets in between [m].
+ROWS, SPACING, RADIUS, DEPTH, DIVIDER, JOINT = 12, 0.02, 0.006, 0.08, 0.0008, 0.001
 FLOOR, LID = -(ROWS - 1) * SPACING - DEPTH, 0.04
 # k_B T of the pegs [J]
 ROUGH = 2.87e-3
@@ -48,12 +49,12 @@ def pegs() -> np.ndarray:
 def board(rough: float = ROUGH) -> swarm.Scene:
     """Pegs, dividers below those of the last row, and a box; rough = 0: smooth pegs that take half the speed."""
     law = {"temperature": rough} if rough else {"temperature": 1.0, "accommodation": 0.0, "restitution": 0.5}
-    below = pegs()[-ROWS:] - (0.0, 0.0, 0.5 * DEPTH)
+    below = pegs()[-ROWS:] - (0.0, 0.0, 0.5 * (DEPTH + JOINT))
     half, middle = 0.5 * (LID - FLOOR), 0.5 * (LID + FLOOR)
     return swarm.Scene(
         [
             swarm.Cylinders(pegs(), RADIUS, axes=(0.0, 1.0, 0.0), **law),
-            swarm.Boxes(below, (DIVIDER, 0.5 * SPACING, 0.5 * DEPTH), **DULL),
+            swarm.Boxes(below, (DIVIDER, 0.5 * SPACING + JOINT, 0.5 * (DEPTH + JOINT)), **DULL),
             swarm.Box((0.5 * (ROWS + 1) * SPACING, 0.5 * SPACING, half), center=(0.0, 0.0, middle), **DULL),
         ],
         gravity=(0.0, 0.0, -9.81),

@@ -89,6 +89,9 @@ IN_ONE_PLACE = {
     ),
     "tiles": ([BRICK, swarm.Box((0.5, 0.5, 0.5), center=(1.0, 0.0, 0.0), side="outside")], "touch at a face"),
     "drums": ([COLUMN, swarm.Cylinder(0.1, length=0.4, center=(0.5, 0, 0.6), side="outside")], "touch at a face"),
+    "tiles of a field": ([HALL, swarm.Boxes([[0.2 * k, 0.0, -0.3] for k in range(3)], (0.1,) * 3)], "touch at a face"),
+    "pegs of a field": ([FLOOR, swarm.Cylinders([[0.0, 0.0, 0.2]], 0.1, lengths=0.4)], "touch at a face"),
+    "turned tiles": ([HALL, swarm.Boxes([[0, 0, 0], [0, 0.2, 0]], (0.1,) * 3, [[0, 1.0, 0, 0]] * 2)], "touch at a"),
     "a post that stays": ([swarm.Plane((0.0, 0.0, -1.0), present=[(0, 1)]), POST], "touch at a face"),
     "two bricks": ([BRICK, swarm.Box((0.5, 0.5, 0.5), center=(1.0, 0.9, 0.0), side="outside")], "touch at a face"),
 }
@@ -108,6 +111,8 @@ NOT_IN_ONE_PLACE = {
     "a post above its floor": [FLOOR, swarm.Box((0.1, 0.1, 0.1), center=(0.5, 0.0, 0.2), side="outside")],
     "bricks in one layer, apart": [BRICK, swarm.Box((0.5, 0.5, 0.5), center=(1.0, 1.5, 0.0), side="outside")],
     "bricks beside one another": [BRICK, swarm.Box((0.5, 0.5, 0.5), center=(2.0, 0.0, 0.0), side="outside")],
+    "tiles apart": [HALL, swarm.Boxes([[0.3 * k, 0.0, -0.3] for k in range(3)], (0.1,) * 3)],
+    "tiles that overlap": [HALL, swarm.Boxes([[0.19 * k, 0.0, -0.3] for k in range(3)], (0.1,) * 3)],
     "a turned post": [FLOOR, swarm.Box((0.1, 0.1, 0.1), center=(0.5, 0, 0.1), side="outside", rotation=TURN)],
 }  # fmt: skip
 
@@ -122,7 +127,7 @@ def hints_of_walls(surfaces, caplog, of_points=True):
 def test_walls_in_one_place_are_reported(name, caplog):
     surfaces, words = IN_ONE_PLACE[name]
     (sentence,) = hints_of_walls(surfaces, caplog)
-    assert "surfaces[0]" in sentence
+    assert "surfaces[0]" in sentence or "body 0 of surfaces[1]" in sentence
     assert "surfaces[1]" in sentence
     assert words in sentence
 

@@ -146,7 +146,9 @@ class Many(Surface):
     def lids(self, across: int) -> list[float]:
         return []
 
-    def images(self, which: NDArray[np.int64], centers: Floats, repeated: tuple[Floats, Floats]) -> "Many":
+    def images(
+        self, which: NDArray[np.int64], centers: Floats, repeated: tuple[Floats, Floats] | None = None
+    ) -> "Many":
         """A field of these bodies, at other places, for a cell with these corners that repeats."""
         given = {field.name: getattr(self, field.name) for field in fields(self)}
         taken: dict[str, Any] = {name: value[which] for name, value in given.items() if isinstance(value, np.ndarray)}
