@@ -7,6 +7,7 @@ import pytest
 
 import swarm
 from swarm.kernel.vector import Vec
+from swarm.surfaces.balls import vaulted
 
 BOXES = swarm.Union([swarm.Box((0.5, 0.5, 0.5)), swarm.Box((0.6, 0.2, 0.25), (0.9, 0.1, 0.05))])
 SPHERES = swarm.Union([swarm.Sphere(0.5), swarm.Sphere(0.4, (0.6, 0.1, 0.0))])
@@ -54,6 +55,34 @@ def met(union, radius, place, velocity, pull):
             later, meets = min(looked)
             time += later
     return time, meets
+
+
+def test_a_ball_flies_over_the_middle_of_a_room_to_the_other_wall():
+    """Next to the middle of the second room: the nearer wall of that is the one that the first room hides."""
+    union = swarm.Union([swarm.Box((1.0, 1.0, 1.0), (-0.8, 0.0, 0.0)), swarm.Box((0.7, 0.7, 0.7), (0.8, 0.0, 0.0))])
+    time, meets = met(union, 0.02, (0.79, 0.07, 0.18), (0.94, -0.35, 0.04), None)
+    assert meets
+    assert time == pytest.approx((1.48 - 0.79) / 0.94, rel=1e-15)
+
+
+@pytest.mark.parametrize("name", ["boxes", "spheres", "pipe"])
+def test_a_flight_takes_few_looks_at_the_walls_and_none_beyond_them(name, monkeypatch):
+    """Looks and bisections to each wall, without those that another one comes before."""
+    looks, nearest = [], vaulted.nearest
+    look = vaulted._look
+
+    def counted(*arguments):
+        looks.append(arguments)
+        return look(*arguments)
+
+    monkeypatch.setattr(vaulted, "_look", counted)
+    monkeypatch.setattr(vaulted, "nearest", lambda *arguments: looks.append(arguments) or nearest(*arguments))
+    random, walls = np.random.default_rng(2), walls_of(UNIONS[name], 0.05)
+    with np.errstate(all="ignore"):
+        for _flight in range(20):
+            place, velocity = Vec(*random.uniform(-0.2, 0.2, 3)), Vec(*random.normal(size=3))
+            assert any(wall.first_hit(place, velocity)[0] < math.inf for wall in walls)
+    assert len(looks) < 12 * 20 * len(walls)
 
 
 @pytest.mark.parametrize("name", list(TIPPED))

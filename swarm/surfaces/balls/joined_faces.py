@@ -6,8 +6,8 @@ place of a face or an edge that is nearest to it. On an edge Newton's method fin
 nearest to the ball on the line in both tangent planes.
 
 Flights of hard balls take safe steps. Where the foot on a face is seen, a flight is free until it meets the parallel
-surface. Near an edge it is free for a time that follows from the curvature of the edge. A hidden face or edge is not
-met before its foot may be seen, and not before it is as near as a radius.
+surface. Near an edge it is free for a time that follows from the curvature of the edge. A hidden face is not met before
+its foot may be seen. A hidden edge is not met before its foot may be seen or is as near as a radius.
 """
 
 import math
@@ -170,6 +170,17 @@ def is_seen(rooms, own, place, slack):
     return hidden(rooms, own, place, ZERO) <= slack
 
 
+def gap_of(rooms, place):
+    """How far a place is outside of all rooms, at least; below 0 in one of them."""
+    least = math.inf
+    for room in rooms:
+        gap = -math.inf
+        for wall in room:
+            gap = max(gap, wall.distance(place))
+        least = min(least, gap)
+    return least
+
+
 @outlined
 def hidden(rooms, own, place, n):
     """A lower bound of the distance from a place of a face or an edge to where that is seen; 0 or less if it is seen.
@@ -282,12 +293,17 @@ class Hidden(rising.Ahead):
 def _look(wall, r, v, pull, t, is_first):
     """The `SafeStep` of a flight from the time t on."""
     p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
-    away, place = nearest(wall, p)
-    room = 2.0 * EPSILON * total(absolute(p))
-    if not is_first and away < wall.radius and dot(place - p, w) > 0.0:
-        return march.SafeStep(t, 0.0, -1.0, 0.0)
+    # Another wall of the union is met on the way out.
+    if not is_first and gap_of(wall.rooms, p) > wall.slack:
+        return march.SafeStep(t, math.inf, -1.0, -1.0)
+    room = EPSILON * total(absolute(p))
     step = _until_any(wall, AtInstant(p, w, pull), math.inf)
-    arrives = (not is_first or step == 0.0) and march.travelled(norm(w), norm(pull), step) <= room
+    arrives = (not is_first or step == 0.0) and march.travelled(norm(w), norm(pull), step) <= 2.0 * room
+    if arrives and not is_first:
+        away, place = nearest(wall, p)
+        # By more than round-off: an edge bends more than its samples say.
+        if away < wall.radius - room and dot(place - p, w) > 0.0:
+            return march.SafeStep(t, 0.0, -1.0, 0.0)
     return march.SafeStep(t, step, select(arrives, 0.0, -1.0), -1.0)
 
 
@@ -328,7 +344,10 @@ def _until_face(wall, face, flight):
     if depth <= wall.slack:
         return flight.until_gone(away)
     way = _way_of_foot(_round_at(face, foot, n), face.slope, abs(away), depth)
-    return max(step, _until_seen(wall, abs(away), way, flight))
+    if isinstance(face.wall, SlabNumbers):
+        # In the middle the foot goes over to the other side.
+        way = min(way, face.wall.radius + away)
+    return max(step, flight.until_gone(max(abs(away) - wall.radius, way)))
 
 
 @outlined
