@@ -125,4 +125,4 @@ class BallNumbers:
 def _collisions(state: State) -> int:
     """How many pairs have met since the start: both of each have counted it."""
     assert state.balls is not None
-    return int(state.balls.all_collisions()[: state.mass.size].sum()) // 2
+    return state.balls.sum_of_collisions(state.mass.size) // 2

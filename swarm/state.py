@@ -110,7 +110,16 @@ class Balls(NamedTuple):
     def all_collisions(self) -> NDArray[np.int64]:
         """`collisions` (N,), also where these have begun anew."""
         found = self.collisions.astype(np.int64, copy=False)
-        return found if self.rounds is None else found + ROUND * (self.rounds // BELOW).astype(np.int64)
+        if self.rounds is not None and self.rounds.max(initial=0) >= BELOW:
+            found += ROUND * (self.rounds // BELOW).astype(np.int64)
+        return found
+
+    def sum_of_collisions(self, n: int) -> int:
+        """The sum of `all_collisions` of the first n balls, without an array of them: these would be 8 bytes a ball."""
+        rounds, found = self.rounds, int(self.collisions[:n].sum())
+        if rounds is not None and rounds[:n].max(initial=0) >= BELOW:
+            found += ROUND * int((rounds[:n] // BELOW).sum())
+        return found
 
     def of(self, some: NDArray[np.bool_], n: int) -> "Balls":
         """That of some of n balls."""
