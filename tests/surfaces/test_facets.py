@@ -12,6 +12,7 @@ from swarm.kernel.gravity import Bounds
 from swarm.kernel.grid import cell_of, entries_of, until_out
 from swarm.kernel.vector import Vec, vec
 from swarm.serialization import tables
+from swarm.surfaces.depth import penetration
 from swarm.surfaces.facets import free_room as room
 from swarm.surfaces.facets.facet_cells import blocks_of, flight_in, from_middle
 from swarm.surfaces.fields.members import member
@@ -239,6 +240,26 @@ def test_nobody_passes_a_wall_of_a_millimetre():
     assert there[within].max() <= 0.499 + 1e-12
     assert there[~within].min() >= 0.5 - 1e-12
     assert end.impacts_per_particle.min() > 10
+
+
+def test_what_touches_one_side_of_a_ledge_is_not_deep_behind_the_other():
+    """Within round-off of a wall, and of the plane of its neighbour at a re-entrant edge."""
+    ring = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
+    corners = [(*place, height) for height in (0.0, 1.0) for place in ring]
+    lids = [(0, k, k + 1) for k in range(1, 5)]
+    sides = [
+        part for a, b in zip(range(6), (1, 2, 3, 4, 5, 0), strict=True) for part in ((a, b, b + 6), (a, b + 6, a + 6))
+    ]
+    room = swarm.Mesh(corners, [*(one[::-1] for one in lids), *(tuple(k + 6 for k in one) for one in lids), *sides])
+    away, along = (each.ravel() for each in np.meshgrid([1e-15, 1e-13, 5e-13], [1e-13, 1e-10, 3e-9, 1e-6]))
+    places = np.array([1.0 - away, 1.0 + along, np.full(away.size, 0.3)])
+    assert (room.phi(places) < 0.0).all()
+    start = swarm.Particles(places, np.zeros(places.shape))
+    seen = swarm.simulate(swarm.Scene([room]), start, swarm.Impact(), until=0.1, compile="never").observables
+    assert seen["max_penetration"].max() < 2e-12
+    # What is behind the middle of a wall is as deep as it is.
+    behind = swarm.Scene([room]).compiled().walls()
+    assert penetration(behind, Vec(0.5, 0.5, -2e-9)) == pytest.approx(2e-9)
 
 
 def test_a_slide_down_a_faceted_hopper_ends_at_its_apex():

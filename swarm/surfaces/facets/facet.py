@@ -121,7 +121,9 @@ class FacetNumbers(Flat):
         depth, within = self.inner(r) - self.offset, self.within(r)
         beyond = select(within < 0.0, within, 0.0)
         there = (beyond == 0.0) & (depth <= self.behind())
-        return select(there, depth, self.elsewhere(beyond, depth))
+        # In the round-off beyond an edge, as before a neighbour that it meets there, a place is no deeper than that
+        depth_there = select((within < self.room.value) & (within < depth), within, depth)
+        return select(there, depth_there, self.elsewhere(beyond, depth))
 
     def is_ahead(self, start, end, near):
         """Whether what goes from one place to another may come through it: it is nearer to the end than `near`."""
