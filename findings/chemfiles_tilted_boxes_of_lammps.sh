@@ -4,12 +4,13 @@
 # chemfiles 0.10.4. For a tilted box LAMMPS dumps the bounds of the box around it: xhi_bound = xhi + max(0, xy, xz, xy +
 # xz), and so on, as its documentation says. chemfiles takes these bounds as the lengths of the edges. What depends on
 # them is off too: positions given as shares of the box, and those that it moves back by the image flags `ix iy iz` of
-# the file, which it does unasked. Nothing is said. ASE, OVITO and lammpsio give the box of the run. Boxes without tilt
-# are right.
+# the file, which it does unasked. A dump that it writes has the lengths where bounds belong, so that others read a
+# smaller box. Nothing is said. ASE, OVITO and lammpsio give the box of the run. Boxes without tilt are right.
 #
 # Seen on 2026-11-30, Python 3.11.7, edges 10, 12, 14 with xy = 1.2, xz = 2.8, yz = 4.2:
 #   first edge: chemfiles 14, ASE, OVITO and lammpsio 10; volume 3175 and 1680
 #   x of a particle at 0.4: as x 0.4; as a share 2.4; with image 1 along x 14.4, where 10.4 is right
+#   the same box written by chemfiles: first edge 6 by ASE and OVITO
 #
 # Exit code 1 if that changes. Usage: bash findings/chemfiles_tilted_boxes_of_lammps.sh
 set -euo pipefail
@@ -70,12 +71,21 @@ write("xs ys zs", *SHARES.tolist())
 _, shared = by_chemfiles()
 write("x y z ix iy iz", *PLACE.tolist(), 1, 0, 0)
 _, image = by_chemfiles()
+frame = chemfiles.Frame()
+frame.add_atom(chemfiles.Atom("Ar"), PLACE)
+frame.cell = chemfiles.UnitCell(EDGES.T)
+with chemfiles.Trajectory("written.lammpstrj", "w") as file:
+    file.write(frame)
+written = [float(import_file("written.lammpstrj").compute().cell[0, 0]),
+           float(ase.io.read("written.lammpstrj", format="lammps-dump-text").cell[0, 0])]
 print(f"edges of chemfiles: {cell.round(4).tolist()}, volume {np.linalg.det(cell):.0f}; of the run, as by "
       f"{', '.join(others)}: {EDGES.tolist()}, volume {np.linalg.det(EDGES):.0f}")
 print(f"x of a particle at {PLACE[0]:g}: as x {plain}, as a share {shared}, in the next image {image}")
+print(f"first edge of a dump that chemfiles writes: {written} by OVITO and ASE")
 right = all(np.allclose(found, EDGES, atol=1e-9) for found in others.values())
 larger = EDGES.copy()
 larger[0, 0], larger[1, 1] = (MOST - LEAST)[:2]
-sys.exit(not (right and np.allclose(cell, larger) and (plain, shared, image) == (0.4, 2.4, 14.4)))
+sys.exit(not (right and np.allclose(cell, larger) and (plain, shared, image) == (0.4, 2.4, 14.4)
+              and np.allclose(written, 6)))
 PYTHON
 cd "$folder" && venv/bin/python main.py

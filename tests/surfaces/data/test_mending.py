@@ -88,6 +88,15 @@ def test_a_hollow_cube_is_inside_out_within():
     assert swarm.Mesh(corners, faces).volume() == pytest.approx(0.875, abs=1e-12)
 
 
+def test_faces_whose_numbers_rise_have_sides_again():
+    # openstl 4.0.1 sorts the numbers of each face, findings/openstl_faces_without_sides.sh.
+    corners, faces = np.concatenate([CORNERS, 0.5 * CORNERS]), np.concatenate([FACES, FACES + 8])
+    rising = np.sort(faces, axis=1)
+    assert abs(np.linalg.det(corners[rising]).sum() / 6 - 0.875) > 0.1
+    assert volume(mesh_of(corners, rising)) == pytest.approx(0.875, abs=1e-12)
+    assert swarm.Mesh(corners, rising).volume() == pytest.approx(0.875, abs=1e-12)
+
+
 def test_holes_are_listed_by_place_and_size():
     ball = trimesh.creation.icosphere(3)
     faces = np.delete(np.array(ball.faces), np.arange(0, 1280, 160), axis=0)
