@@ -123,17 +123,22 @@ def _exact(n: int, collisions: float, frames: int) -> list[Row]:
     ]
 
 
-# Cavities of about the same size: what an event costs of balls in each, beside points in it, and balls in a box.
+# Cavities of about the same size: what an event costs of balls in each, beside points in it, and balls in a box; and
+# the same of those that fall.
+_BOX, _FORMULA = swarm.Box((0.9, 0.9, 0.9)), swarm.Formula("x**4 + y**4 + z**4 - 1")
+_GRAVITY = (0.0, 0.0, -1.0)
 CAVITIES = {
-    "a box": swarm.Box((0.9, 0.9, 0.9)),
-    "an ellipsoid": swarm.Ellipsoid((1.0, 0.9, 0.95)),
-    "a formula": swarm.Formula("x**4 + y**4 + z**4 - 1"),
+    "a box": (_BOX, None),
+    "an ellipsoid": (swarm.Ellipsoid((1.0, 0.9, 0.95)), None),
+    "a formula": (_FORMULA, None),
+    "two boxes": (swarm.Union([_BOX, swarm.Box((0.6, 0.6, 0.6), (1.3, 0.0, 0.0))]), None),
+    "a box under gravity": (_BOX, _GRAVITY),
+    "a formula under gravity": (_FORMULA, _GRAVITY),
 }
 
 
-def _event(surface: swarm.surfaces.Surface, radius: float | None, count: int, until: float) -> Callable[[], float]:
+def _event(scene: swarm.Scene, radius: float | None, count: int, until: float) -> Callable[[], float]:
     """Microseconds of processor time an impact or a collision, on one thread, at a packing of a few thousandths."""
-    scene = swarm.Scene([surface])
     start = swarm.fill(scene, count, speed=1.0, radius=radius, seed=1)
 
     def measure() -> float:
@@ -149,17 +154,21 @@ def _cavities(quick: bool) -> list[Row]:
     """An event of balls in cavities of several kinds, over that of points there, which take up to eight at once."""
     count, until = (3, 2.0) if quick else (500, 150.0)
     measures = {}
-    for name, surface in CAVITIES.items():
-        measures[name, "point"] = _event(surface, None, count, until if quick else 40.0 * until)
-        measures[name, "ball"] = _event(surface, 0.02, count, until)
+    for name, (surface, gravity) in CAVITIES.items():
+        scene = swarm.Scene([surface], gravity)
+        measures[name, "point"] = _event(scene, None, count, until if quick else 40.0 * until)
+        measures[name, "ball"] = _event(scene, 0.02, count, until)
     found = in_turn({f"{kind} in {name}": measure for (name, kind), measure in measures.items()}, 1 if quick else 5)
     rows = []
     for what, (best, median) in found.items():
         point = found[what.replace("ball", "point")][0]
         rows.append(Row(f"{what}, an event", best, median, "us", "", best / point if "ball" in what else None))
-    box, formula = found["ball in a box"], found["ball in a formula"]
-    over = formula[0] / box[0]
-    return [*rows, Row("ball in a formula over a ball in a box", over, formula[1] / box[1], "")]
+    for name, (_surface, gravity) in CAVITIES.items():
+        nearest = "a box" if gravity is None else "a box under gravity"
+        if name != nearest:
+            one, other = (np.array(found[f"ball in {where}"]) for where in (name, nearest))
+            rows.append(Row(f"ball in {name} over one in {nearest}", *(one / other).tolist(), "", "3"))
+    return rows
 
 
 def main(quick: bool = False) -> None:

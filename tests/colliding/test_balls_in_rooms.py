@@ -7,7 +7,7 @@ import pytest
 
 import swarm
 from swarm.kernel.vector import Vec
-from swarm.surfaces.balls import vaulted
+from swarm.surfaces.balls import joined_faces
 
 BOXES = swarm.Union([swarm.Box((0.5, 0.5, 0.5)), swarm.Box((0.6, 0.2, 0.25), (0.9, 0.1, 0.05))])
 SPHERES = swarm.Union([swarm.Sphere(0.5), swarm.Sphere(0.4, (0.6, 0.1, 0.0))])
@@ -68,15 +68,15 @@ def test_a_ball_flies_over_the_middle_of_a_room_to_the_other_wall():
 @pytest.mark.parametrize("name", ["boxes", "spheres", "pipe"])
 def test_a_flight_takes_few_looks_at_the_walls_and_none_beyond_them(name, monkeypatch):
     """Looks and bisections to each wall, without those that another one comes before."""
-    looks, nearest = [], vaulted.nearest
-    look = vaulted._look
+    looks, nearest = [], joined_faces.nearest
+    look = joined_faces._look
 
     def counted(*arguments):
         looks.append(arguments)
         return look(*arguments)
 
-    monkeypatch.setattr(vaulted, "_look", counted)
-    monkeypatch.setattr(vaulted, "nearest", lambda *arguments: looks.append(arguments) or nearest(*arguments))
+    monkeypatch.setattr(joined_faces, "_look", counted)
+    monkeypatch.setattr(joined_faces, "nearest", lambda *arguments: looks.append(arguments) or nearest(*arguments))
     random, walls = np.random.default_rng(2), walls_of(UNIONS[name], 0.05)
     with np.errstate(all="ignore"):
         for _flight in range(20):
