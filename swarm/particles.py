@@ -20,6 +20,13 @@ _OF_FRAMES = (
 )  # fmt: skip
 
 
+class VolumeEstimate(NamedTuple):
+    """A volume [m^3], in a plane an area [m^2]."""
+
+    volume: float
+    error: float | None  # its standard error; 0 in closed form, None where it is not known
+
+
 class Particles:
     """Positions, velocities and masses of N particles.
 
@@ -33,8 +40,8 @@ class Particles:
         spin: (3, N), (3,) or None: of balls the angular velocity [rad/s]; None where nothing turns them.
 
     The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], in a plane the area [m^2], or
-    None. Arrays that are
-    assigned later are checked and converted in the same way when a run starts.
+    None, and `volume_error` its standard error: 0 where it is a closed form, None where it is not known. Arrays that
+    are assigned later are checked and converted in the same way when a run starts.
 
     Raises:
         SceneError: wrong shapes, no particle, a value that is not finite or beyond 1e100, a mass or a radius not from
@@ -44,7 +51,7 @@ class Particles:
     2
     """
 
-    _volume: float | Callable[[], float] | None = None
+    _volume: VolumeEstimate | Callable[[], VolumeEstimate] | None = None
     # The births of the particles in a run with sources.
     births: "Births | None" = None
 
@@ -75,14 +82,24 @@ class Particles:
     @property
     def volume(self) -> float | None:
         """The volume that the particles were filled into [m^3], in a plane the area [m^2]; None if not known."""
+        content = self._content()
+        return None if content is None else content.volume
+
+    @volume.setter
+    def volume(self, volume: float | Callable[[], VolumeEstimate] | None) -> None:
+        """Set the volume, or a function that returns it with its error when it is first asked for."""
+        self._volume = volume if volume is None or callable(volume) else VolumeEstimate(volume, None)
+
+    @property
+    def volume_error(self) -> float | None:
+        """The standard error of `volume`: 0 where that is a closed form; None if not known."""
+        content = self._content()
+        return None if content is None else content.error
+
+    def _content(self) -> VolumeEstimate | None:
         if callable(self._volume):
             self._volume = self._volume()
         return self._volume
-
-    @volume.setter
-    def volume(self, volume: float | Callable[[], float] | None) -> None:
-        """Set the volume, or a function that returns it when it is first asked for."""
-        self._volume = volume
 
     def __len__(self) -> int:
         return int(self.position.shape[1])

@@ -247,11 +247,15 @@ def test_few_particles_have_the_bits_of_a_whole_batch(scene, n, monkeypatch):
 
 @pytest.mark.parametrize(
     "surfaces",
-    [[swarm.Sphere(0.5)], [swarm.Box((0.5, 0.4, 0.3))], [swarm.Sphere(0.5), swarm.Sphere(0.3, side="outside")]],
+    [
+        [swarm.Sphere(0.5), swarm.Plane((0.0, 0.0, 1.0), 0.4)],
+        [swarm.Box((0.5, 0.4, 0.3)), swarm.Plane((0.0, 0.0, 1.0), 1.0)],
+        [swarm.Sphere(0.5), swarm.Sphere(0.3, (0.3, 0.0, 0.0), side="outside")],
+    ],
     ids=["sphere", "box", "hollow"],
 )
 def test_few_balls_have_the_bits_of_whole_batches(surfaces, monkeypatch):
-    """Their volume is that of the random points, all of which need not be looked at."""
+    """Where no closed form is known, their volume is that of the random points, not all of which are looked at."""
     scene = swarm.Scene(surfaces)
     few = swarm.fill(scene, 5, temperature=1.0, seed=3, radius=0.02)
     kept = pickle.loads(pickle.dumps(few.copy()))
@@ -262,4 +266,6 @@ def test_few_balls_have_the_bits_of_whole_batches(surfaces, monkeypatch):
     np.testing.assert_array_equal(few.position, whole.position)
     np.testing.assert_array_equal(few.velocity, whole.velocity)
     assert volume == kept.volume == whole.volume
-    assert volume == filling._points(scene, filling._POINTS, np.random.default_rng(3))[1]
+    measured = filling._points(scene, filling._POINTS, np.random.default_rng(3))[1]()
+    assert (volume, few.volume_error) == measured
+    assert 0.0 <= measured.error < 1e-2 * volume

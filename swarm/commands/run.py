@@ -123,7 +123,7 @@ def run(  # noqa: PLR0913  one argument an option
         if not (quiet or as_json):
             from .summary import of_result
 
-            table(of_result(result, getattr(start, "volume", None)))
+            table(of_result(result, getattr(start, "volume", None), getattr(start, "volume_error", None)))
 
 
 def _stopped(reason: str, target: Path, has_frames: bool, on_cluster: bool) -> str | None:

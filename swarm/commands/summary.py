@@ -89,6 +89,7 @@ def of_recording(file: Path, repair: bool) -> dict[str, str]:
     }
 
 
-def of_result(result: Result, volume: float | None) -> dict[str, str]:
-    """The outcome of a run; `volume` is the volume its particles were filled into [m^3]."""
-    return ({} if volume is None else {"volume": amount(volume, "m³")}) | facts.of_result(result)
+def of_result(result: Result, volume: float | None, error: float | None = None) -> dict[str, str]:
+    """The outcome of a run; `volume` is the volume its particles were filled into, with its standard error [m^3]."""
+    known = {} if volume is None else {"volume": amount(volume, "m³") + (f" ± {error:.1g} m³" if error else "")}
+    return known | facts.of_result(result)

@@ -88,7 +88,7 @@ def pack(
     require_size(still, radii)
     packing = balls_volume(still, radii) / room.volume
     _require_below("the packing", packing, len(still.axes()), f" of {packing_of(still, radii, room)}")
-    made.position, made.volume = _places(still, radii, room, random), room.volume
+    made.position, made.volume = _places(still, radii, room, random), room.measured
     made.image = None if scene.period is None else np.zeros((3, radii.size), np.int64)
     if moves:
         fill_velocities(scene, made, speed, temperature, False, random)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..common import checks
 from ..errors import SceneError
-from ..particles import Particles
+from ..particles import Particles, VolumeEstimate
 from ..scene import Scene
 from ..state import Floats
 from .fitting_shapes import require_shapes
@@ -60,8 +60,10 @@ def fill(
             one after the other, the largest first; None: points, which do not meet one another.
 
     Returns:
-        The particles; their `volume` is the admissible volume of points [m^3], estimated from the random points; in a
-        scene with a plane all of them are in it, and it is the admissible area [m^2].
+        The particles; their `volume` is the admissible volume of points [m^3]; in a scene with a plane all of them are
+        in it, and it is the admissible area [m^2]. It is a closed form where the scene is one cavity that has one, or a
+        cell that repeats, less solids within that do not overlap; else it is estimated from the random points, and
+        `volume_error` is the standard error.
 
     Raises:
         SceneError: an argument is out of its range, both or neither of speed and temperature are given, the
@@ -125,7 +127,7 @@ def fill_velocities(
         particles.velocity = normal * np.sqrt(temperature / particles.mass)
 
 
-def _place(scene: Scene, particles: Particles, random: np.random.Generator) -> Callable[[], float]:
+def _place(scene: Scene, particles: Particles, random: np.random.Generator) -> Callable[[], VolumeEstimate]:
     """Put balls where they overlap nothing; returns what measures the volume."""
     assert particles.radius is not None
     require_shapes(scene, particles.radius)
@@ -145,13 +147,13 @@ def room_of(scene: Scene, random: np.random.Generator, user: str) -> VolumeBox:
     box, found, tried = float(np.prod((high - low)[axes])), 0, 0
     if _is_its_box(scene, low, high):
         random.bit_generator.advance(len(axes) * _BATCH)  # type: ignore[attr-defined]
-        return VolumeBox(low, high, functools.partial(float, box))
+        return VolumeBox(low, high, functools.partial(VolumeEstimate, box, 0.0))
     while found < _POINTS:
         found += _admitted(scene, low, high, random, _BATCH)
         random.bit_generator.advance(len(axes) * _BATCH)  # type: ignore[attr-defined]
         tried += _BATCH
         _require_share(scene, user, (low, high), found, tried)
-    return VolumeBox(low, high, functools.partial(float, box * found / tried))
+    return VolumeBox(low, high, functools.partial(_content, scene, box, found, tried))
 
 
 def _roomy(scene: Scene, radius: Floats, random: np.random.Generator) -> VolumeBox | None:
@@ -166,7 +168,9 @@ def _roomy(scene: Scene, radius: Floats, random: np.random.Generator) -> VolumeB
     share = found / _SOME
     off = _CERTAIN * math.sqrt(share * (1.0 - share) / _SOME) + _CERTAIN / _SOME
     least, most = (math.ceil(1.0 / max(share + way * off, 1e-6)) for way in (1.0, -1.0))
-    sure = VolumeBox(low, high, lambda: float(np.prod((high - low)[scene.axes()])) * (share - off))
+    sure = VolumeBox(
+        low, high, lambda: VolumeEstimate(float(np.prod((high - low)[scene.axes()])) * (share - off), None)
+    )
     if least != most or not is_sparse(scene, radius, sure):
         return None
     state = random.bit_generator.state
@@ -174,11 +178,28 @@ def _roomy(scene: Scene, radius: Floats, random: np.random.Generator) -> VolumeB
     return VolumeBox(low, high, functools.partial(_measured, scene, state))
 
 
-def _measured(scene: Scene, state: Any) -> float:
+def _measured(scene: Scene, state: Any) -> VolumeEstimate:
     """The volume that `room_of` finds from a state of a generator."""
+    if (exact := _exact(scene)) is not None:
+        return exact
     random = np.random.default_rng(0)
     random.bit_generator.state = state
-    return room_of(scene, random, "fill").volume
+    return room_of(scene, random, "fill").measured()
+
+
+def _exact(scene: Scene) -> VolumeEstimate | None:
+    """The volume in closed form, or None."""
+    from .closed_form import closed_form  # loaded where a volume is asked for
+
+    volume = closed_form(scene)
+    return None if volume is None else VolumeEstimate(volume, 0.0)
+
+
+def _content(scene: Scene, box: float, found: int, tried: int) -> VolumeEstimate:
+    """The volume in closed form, else the part of a box that as many of the tried points have found."""
+    share = found / tried
+    # The share of n points has the variance p (1 - p)/n.
+    return _exact(scene) or VolumeEstimate(box * found / tried, box * math.sqrt(share * (1.0 - share) / tried))
 
 
 def _is_its_box(scene: Scene, low: Floats, high: Floats) -> bool:
@@ -220,7 +241,7 @@ def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]
 
 def _few_points(
     scene: Scene, n: int, seed: int, random: np.random.Generator
-) -> tuple[Floats, Callable[[], float]] | None:
+) -> tuple[Floats, Callable[[], VolumeEstimate]] | None:
     """What `_points` returns, from the first trials of its batch, with the volume for later.
 
     Returns None, with nothing drawn, if n admissible points are not among those trials.
@@ -242,12 +263,12 @@ def _few_points(
     return inside[:, :n], functools.partial(_volume_of, scene, seed)
 
 
-def _volume_of(scene: Scene, seed: int) -> float:
-    """The volume [m^3], in a plane the area, from the first batch of random points of a seed."""
-    return _points(scene, 1, np.random.default_rng(seed))[1]
+def _volume_of(scene: Scene, seed: int) -> VolumeEstimate:
+    """The volume in closed form, else from the first batch of random points of a seed."""
+    return _exact(scene) or _points(scene, 1, np.random.default_rng(seed))[1]()
 
 
-def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, float]:
+def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, Callable[[], VolumeEstimate]]:
     """Admissible points, and the volume from their share of the random points of the bounding box."""
     low, high = bounding_box(scene, "fill", _INSTEAD)
     points, found, tried, admissible = np.empty((3, n)), 0, 0, 0
@@ -263,7 +284,7 @@ def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, 
         found += inside.shape[1]
         tried += _BATCH
         _require_share(scene, "fill", (low, high), found, tried)
-    return points, box * admissible / tried
+    return points, functools.partial(_content, scene, box, admissible, tried)
 
 
 def _require_share(scene: Scene, user: str, corners: tuple[Floats, Floats], found: int, tried: int) -> None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..ball_numbers import balls_volume
 from ..errors import SceneError
+from ..particles import VolumeEstimate
 from ..scene import Scene
 from ..state import Floats
 from .cells import CellLists, empty_cells, enter_free, find_free, order_of
@@ -36,12 +37,12 @@ class VolumeBox(NamedTuple):
 
     low: Floats
     high: Floats
-    measured: Callable[[], float]
+    measured: Callable[[], VolumeEstimate]
 
     @property
     def volume(self) -> float:
         """How large it is."""
-        return self.measured()
+        return self.measured().volume
 
 
 def require_size(scene: Scene, radius: Floats) -> None:

@@ -319,6 +319,17 @@ class Surface(Validated):
         """A box (lower, upper) around a solid or a cavity; infinite where it is unbounded."""
         return (replace(self, side="inside") if self.is_solid() else self).bounds()  # type: ignore[call-arg]
 
+    def enclosed(self, across: int | None) -> float | None:
+        """The volume within its wall [m^3], with the axis `across` a plane through the origin the area in that [m^2].
+
+        None where no closed form is known, and where it has no end.
+        """
+        return None
+
+    def radius_of_ball(self) -> float | None:
+        """The radius of the ball that it is the surface of [m]; None where it is another shape."""
+        return None
+
     def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
         """The sampler of points that are uniform in its area within the bounds (lower, upper).
 

@@ -280,6 +280,9 @@ class Mesh(Surface):
     def enclosing_box(self) -> Box:
         return tuple(self.corners.min(axis=0).tolist()), tuple(self.corners.max(axis=0).tolist())
 
+    def enclosed(self, across: int | None) -> float | None:
+        return None if self.open or across is not None else abs(self.volume())
+
     def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
         if across is not None:
             return super().area_samples(bounds, across)

@@ -177,6 +177,12 @@ class Outlined(Many):
 
     # --- How it is drawn ---
 
+    def enclosed(self, across: int | None) -> float | None:
+        if across is None:
+            return None if self.height is None else self.area() * self.height
+        half = math.inf if self.height is None else 0.5 * self.height
+        return self.area() if across == self.across and abs(self.center[across]) < half else None
+
     def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
         """Its sides and, of a prism, its lids."""
         frame = self.frame

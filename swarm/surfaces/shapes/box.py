@@ -5,14 +5,16 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Any
 
+import numpy as np
+
 from ...common.checks import Vector, list_of, one_of
 from ...common.validated import Lengths
 from ...errors import SceneError
 from ...kernel.vector import vec
 from .. import rotation as rotations
 from ..balls.rounded import RoundBox
+from ..surface import TILT, HalfSpace, Surface, box_around, farthest, rotated_box, side_sign
 from ..surface import Box as Bounds
-from ..surface import HalfSpace, Surface, box_around, farthest, rotated_box, side_sign
 from .plane import PlaneNumbers
 from .slab import slab_numbers
 from .solid import body
@@ -103,6 +105,18 @@ class Box(Surface):
         lx, ly, lz = (-math.inf if "-" + name in self.open else low[i] for i, name in enumerate("xyz"))
         hx, hy, hz = (math.inf if "+" + name in self.open else high[i] for i, name in enumerate("xyz"))
         return rotated_box(self.rotation, ((lx, ly, lz), (hx, hy, hz)), self.center)
+
+    def enclosed(self, across: int | None) -> float | None:
+        if self.open:
+            return None
+        widths = [2.0 * half for half in self.half_widths]
+        if across is None:
+            return math.prod(widths)
+        tilts = np.abs(rotations.matrix(self.rotation)[across])
+        upright = int(np.argmax(tilts))
+        if np.delete(tilts, upright).max() > TILT or abs(self.center[across]) >= self.half_widths[upright]:
+            return None
+        return math.prod(width for k, width in enumerate(widths) if k != upright)
 
     def extent(self) -> float:
         return farthest(self.center) + math.hypot(*self.half_widths)

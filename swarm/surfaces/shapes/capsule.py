@@ -14,7 +14,7 @@ from ...kernel.jit import select
 from ...kernel.vector import Symmetric, Vec, dot, square, vec
 from ..area_samples import AreaSample, Region, directions
 from ..rotation import Direction
-from ..surface import Box, box_around, farthest, side_sign
+from ..surface import TILT, Box, box_around, farthest, side_sign
 from ..time_of_impact.approach import Border, LevelBound
 from ..time_of_impact.course import ball_rise_time
 from .common import Distance
@@ -67,6 +67,15 @@ class Capsule(Revolved):
 
     def extent(self) -> float:
         return farthest(self.center) + self.radius + 0.5 * self.length
+
+    def enclosed(self, across: int | None) -> float | None:
+        section = math.pi * self.radius**2
+        if across is None:
+            return section * (4.0 / 3.0 * self.radius + self.length)
+        if self.is_upright(across):
+            return section if abs(self.center[across]) < 0.5 * self.length or self.center[across] == 0.0 else None
+        lies = abs(self.direction()[across]) <= TILT and self.center[across] == 0.0
+        return section + 2.0 * self.radius * self.length if lies else None
 
     def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
         if across is not None:

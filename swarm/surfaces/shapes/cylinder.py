@@ -10,7 +10,7 @@ from ...kernel.vector import vec
 from .. import rotation as rotations
 from ..balls.rounded import RoundCan
 from ..balls.tube import tube_of
-from ..surface import Box, HalfSpace, box_around, extents, farthest, side_sign
+from ..surface import TILT, Box, HalfSpace, box_around, extents, farthest, side_sign
 from .quadratic import QuadricNumbers, quadric_numbers
 from .revolved import Revolved, tangents
 from .slab import SlabNumbers, slab_numbers
@@ -83,6 +83,15 @@ class Cylinder(Revolved):
 
     def half_spaces(self) -> list[HalfSpace]:
         return [] if self.is_solid() else tangents(self.direction(), self.center, 0.0, self.radius)
+
+    def enclosed(self, across: int | None) -> float | None:
+        section, half = math.pi * self.radius**2, math.inf if self.length is None else 0.5 * self.length
+        if across is None:
+            return None if self.length is None else section * self.length
+        if self.is_upright(across):
+            return section if abs(self.center[across]) < half else None
+        lies = abs(self.direction()[across]) <= TILT and self.center[across] == 0.0
+        return 2.0 * self.radius * self.length if self.length is not None and lies else None
 
     def extent(self) -> float:
         return farthest(self.center) + math.hypot(self.radius, 0.5 * (self.length or 0.0))

@@ -17,7 +17,7 @@ from ...kernel.vector import cross, norm, times, total, vec
 from .. import rotation as rotations
 from ..balls.egg import EggCavity, EggSolid
 from ..balls.parallel import reach_by_distance
-from ..surface import Box, Surface, box_around, farthest, rotated_box, side_sign
+from ..surface import Box, Surface, box_around, extents, farthest, rotated_box, side_sign
 from ..time_of_impact.course import level_and_window, rise_time_inside
 from .quadratic import QuadricNumbers, form, turning, widths
 
@@ -73,6 +73,14 @@ class Ellipsoid(Surface):
     def bounds(self) -> Box:
         box = box_around(self.center, self.semi_axes, self.side)
         return rotated_box(self.rotation, box, self.center)
+
+    def enclosed(self, across: int | None) -> float | None:
+        product = math.pi * math.prod(self.semi_axes)
+        if across is None:
+            return 4.0 / 3.0 * product
+        # A section through the centre has pi a b c over the half extent along its normal.
+        half = extents(rotations.matrix(self.rotation), self.semi_axes)[across]
+        return product / half if self.center[across] == 0.0 else None
 
     def extent(self) -> float:
         return farthest(self.center) + max(self.semi_axes)

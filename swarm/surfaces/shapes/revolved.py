@@ -37,6 +37,11 @@ class Revolved(Surface):
     def is_unturned_by(self, axis: Vector, center: Vector) -> bool:
         return is_along(self.direction(), axis) and is_on_axis(self.center, axis, center)
 
+    def is_upright(self, across: int) -> bool:
+        """Whether its axis is along that axis of the scene."""
+        x, y, z = np.eye(3)[across].tolist()
+        return is_along(self.direction(), (x, y, z))
+
     def walls(self) -> tuple[Any, ...]:
         return (rotations.rotated(self.turn(), self.numbers()),)
 

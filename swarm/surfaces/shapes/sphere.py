@@ -65,6 +65,14 @@ class Sphere(Surface):
     def extent(self) -> float:
         return farthest(self.center) + self.radius
 
+    def radius_of_ball(self) -> float | None:
+        return self.radius
+
+    def enclosed(self, across: int | None) -> float | None:
+        if across is None:
+            return 4.0 / 3.0 * math.pi * self.radius**3
+        return math.pi * self.radius**2 if self.center[across] == 0.0 else None
+
     def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
         if across is not None:
             return super().area_samples(bounds, across)

@@ -17,7 +17,7 @@ from ...state import Floats
 from ..area_samples import AreaSample, Region
 from ..parametrised import Triangles, halved
 from ..rotation import matrix, turned
-from ..surface import Box, Surface, box_around, farthest, is_along, is_on_axis, rotated_box, side_sign
+from ..surface import TILT, Box, Surface, box_around, farthest, is_along, is_on_axis, rotated_box, side_sign
 from ..time_of_impact.approach import LevelBound
 from .common import Distance
 
@@ -81,6 +81,16 @@ class Torus(Surface):
 
     def extent(self) -> float:
         return farthest(self.center) + self.major_radius + self.minor_radius
+
+    def enclosed(self, across: int | None) -> float | None:
+        section = math.pi * self.minor_radius**2
+        if across is None:
+            return 2.0 * math.pi * self.major_radius * section
+        upright = abs(turned(self.rotation, (0.0, 0.0, 1.0))[across])
+        if self.center[across] != 0.0 or TILT < upright < 1.0 - TILT:
+            return None
+        # Across its axis a ring, else two discs
+        return 4.0 * math.pi * self.major_radius * self.minor_radius if upright > TILT else 2.0 * section
 
     def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
         if across is not None:
