@@ -26,6 +26,7 @@ class Observable(NamedTuple):
         every: whether files of every version have it.
         main: whether it is among those that a sweep shows.
         may_be_nan: whether NaN is one of its values.
+        instead: what to use in a run without it, for the sentence of an error.
     """
 
     unit: str
@@ -35,6 +36,7 @@ class Observable(NamedTuple):
     every: bool = False
     main: bool = False
     may_be_nan: bool = False
+    instead: str = ""
 
     def components(self) -> tuple[str, ...] | None:
         """The names of the entries of its last axis; None if they have numbers."""
@@ -59,8 +61,9 @@ OBSERVABLES: dict[str, Observable] = {
     ),
     "dissipated_energy": Observable("J", "energy lost at contacts since the start", every=True, main=True),
     "pressure": Observable(
-        "Pa", "pressure by the virial since the frame before; N/m in a plane; NaN where no volume is known",
+        "Pa", "pressure of balls by the virial since the frame before; N/m in a plane; NaN where no volume is known",
         main=True, may_be_nan=True,
+        instead="of points it is the impulse on surface i, observables['impulse'][:, i], over its area and the time",
     ),
     "impacts": Observable("1", "impacts on surfaces since the start", every=True, main=True),
     "collisions": Observable("1", "pairs of balls that met since the start", main=True),
@@ -147,7 +150,9 @@ class Observables(dict[str, Any]):
 
     def __missing__(self, name: Any) -> Any:
         known = OBSERVABLES.get(name)
-        hint = f", {known.meaning}." if known else closest(name, self) or "."
+        hint = closest(name, self) or "."
+        if known:
+            hint = f", {known.meaning}{known.instead and '; '}{known.instead}."
         raise KeyError(f"this run has no observable {name!r}{hint} It has {', '.join(self)}")
 
 

@@ -1,7 +1,9 @@
 """The walls of a trajectory as VTKHDF: triangles, and the solids of large fields, at rest or where they are in a frame.
 
 Cells of triangles have the data "surface", the place in `scene.surfaces`, and "solid", 1 where particles are kept out
-of it; where there are unions also "part", the number of the part among those of all of them, or -1.
+of it; where there are unions also "part", the number of the part among those of all of them, or -1. Of a run with
+`member_impacts` they have "impacts", "residence" [s], "heat" [J] and "absorbed" of their member until the frame: of the
+triangle of a mesh, the solid of a field, the part of a union, or the surface; NaN where that is a side of an outline.
 
 The solids of fields of more than 2000 are points of a file of their own: with "surface", "kind" (0 spheres, 1 boxes,
 2 cylinders, 3 capsules, 4 ellipsoids), "radius" [m] of what has one, "halves", half of the extent along their axes
@@ -46,12 +48,17 @@ def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
         counts = [len(shape.triangles) for shape in drawn]
         for name, numbers in _data_of(chosen.trajectory.scene, drawn).items():
             root[f"CellData/{name}"] = np.repeat(numbers, counts)
-        if not chosen.trajectory.scene.moves():
+        moves = chosen.trajectory.scene.moves()
+        if not moves:
             root["Points"] = np.concatenate([shape.vertices for shape in drawn])
+        if not (moves or chosen.trajectory.members()):
             return
-        steps = vtkhdf.timed(root, chosen, int(firsts[-1]) * np.arange(len(chosen.numbers)))
+        steps = vtkhdf.timed(root, chosen, int(firsts[-1]) * np.arange(len(chosen.numbers)) * moves)
         for name in root["CellData"]:
             steps[f"CellDataOffsets/{name}"] = np.zeros(len(chosen.numbers), np.int64)
+        _write_members(chosen, [drawn] * len(chosen.numbers), root, steps)
+        if not moves:
+            return
         points = root.create_dataset("Points", (len(chosen.numbers) * firsts[-1], 3), np.float64)
         seen = chosen.trajectory.observables
         for done, number in enumerate(chosen.numbers):
@@ -67,6 +74,28 @@ def _data_of(scene: Scene, drawn: list[Shape]) -> dict[str, list[int]]:
     if parts := scene.parts:
         data["part"] = [parts.index((shape.surface, shape.place)) if shape.place else -1 for shape in drawn]
     return data
+
+
+def _write_members(chosen: Exported, drawn: list[list[Shape]], root: Any, steps: Any) -> None:
+    """Write what is counted of the member of each cell until each frame, of which `drawn` are the walls."""
+    counts = [sum(len(shape.triangles) for shape in some) for some in drawn]
+    firsts = np.cumsum([0, *counts])
+    for name in chosen.trajectory.members():
+        values = root.create_dataset(f"CellData/{name}", (firsts[-1],), np.float64)
+        steps[f"CellDataOffsets/{name}"] = firsts[:-1]
+        for k, number in enumerate(chosen.numbers):
+            of_members = chosen.trajectory.members(number)[name]
+            cells = [_of_cells(chosen.trajectory.scene, shape, of_members[shape.surface]) for shape in drawn[k]]
+            values[firsts[k] : firsts[k + 1]] = np.concatenate(cells)
+
+
+def _of_cells(scene: Scene, shape: Shape, of_members: Any) -> Any:
+    """For each triangle of a shape the value of its member; NaN where that is not known."""
+    if shape.place:
+        number: Any = scene.parts.index((shape.surface, shape.place))
+    else:
+        number = shape.members if len(of_members) > 1 else 0
+    return np.full(len(shape.triangles), np.nan if number is None else of_members[number], np.float64)
 
 
 def _write_changing(chosen: Exported, path: Path) -> None:
@@ -98,6 +127,7 @@ def _write_changing(chosen: Exported, path: Path) -> None:
             ]
             root[f"CellData/{name}"] = np.concatenate(numbers).astype(np.int64)
             steps[f"CellDataOffsets/{name}"] = cells
+        _write_members(chosen, [found[state] for state in of_steps], root, steps)
 
 
 def _triangles(drawn: list[Shape]) -> Any:

@@ -27,11 +27,16 @@ _POINTS, _FEW, _MARGIN = 40, 8, 2.0
 
 
 class Cut(NamedTuple):
-    """What is left of triangles, and the edges that the cut has made, pairs of points (R, 2)."""
+    """What is left of triangles, and the edges that the cut has made, pairs of points (R, 2).
+
+    Attributes:
+        origins: for each triangle the number of the one that it is a part of (T,).
+    """
 
     points: Floats
     triangles: Indices
     rims: Indices
+    origins: Indices
 
 
 class SmoothSurface(NamedTuple):
@@ -98,14 +103,15 @@ def cut(surface: SmoothSurface, points: Floats, triangles: Indices, level: Level
     For each of so many `bodies` that cut it there may be more triangles, so that its hole is as round as one alone.
     """
     if not len(triangles):
-        return Cut(points, triangles, np.empty((0, 2), np.int64))
+        return Cut(points, triangles, np.empty((0, 2), np.int64), np.empty(0, np.int64))
     values = level(points)
-    points, triangles, values = _finer(surface, points, triangles, values, level, _MOST + _EACH * bodies)
+    points, triangles, values, origins = _finer(surface, points, triangles, values, level, _MOST + _EACH * bodies)
     kept = values <= 0.0
     inside = kept[triangles].sum(axis=1)
     # So that the corner that differs from both others comes first
-    mixed = triangles[(inside == 1) | (inside == 2)]
-    alone = (kept[mixed] == (inside[(inside == 1) | (inside == 2)] == 1)[:, None]).argmax(axis=1)
+    is_mixed = (inside == 1) | (inside == 2)
+    mixed, of_mixed = triangles[is_mixed], origins[is_mixed]
+    alone = (kept[mixed] == (inside[is_mixed] == 1)[:, None]).argmax(axis=1)
     mixed = np.take_along_axis(mixed, (alone[:, None] + np.arange(3)) % 3, axis=1)
     edges = np.sort(np.concatenate([mixed[:, [0, 1]], mixed[:, [0, 2]]]), axis=1)
     edges, places = np.unique(edges, axis=0, return_inverse=True)
@@ -123,7 +129,8 @@ def cut(surface: SmoothSurface, points: Floats, triangles: Indices, level: Level
     places = np.zeros(len(points) + len(made), np.int64)
     places[used] = np.arange(len(used))
     rims = places[np.stack([first, second], axis=1)]
-    return Cut(np.concatenate([points, made])[used], triangles.reshape(-1, 3), rims)
+    origins = np.concatenate([origins[inside == 3], of_mixed[tip], of_mixed[~tip], of_mixed[~tip]])
+    return Cut(np.concatenate([points, made])[used], triangles.reshape(-1, 3), rims, origins)
 
 
 def _widths(points: Floats, triangles: Indices) -> Floats:
@@ -134,8 +141,13 @@ def _widths(points: Floats, triangles: Indices) -> Floats:
 
 def _finer(
     surface: SmoothSurface, points: Floats, triangles: Indices, values: Floats, level: Level, most: int
-) -> tuple[Floats, Indices, Floats]:
-    """Triangles at the cut in four, as long as it bends within them: points, triangles and the levels of points."""
+) -> tuple[Floats, Indices, Floats, Indices]:
+    """Triangles at the cut in four, as long as it bends within them.
+
+    Returns:
+        Points, triangles, the levels of points, and the number of the triangle that each is a part of.
+    """
+    origins = np.arange(len(triangles))
     for _ in range(_ROUNDS):
         wide, of = _widths(points, triangles), values[triangles]
         near = np.flatnonzero((of.min(axis=1) < wide) & (of.max(axis=1) > -wide))
@@ -156,8 +168,9 @@ def _finer(
         (a, b, c), (p, q, r) = triangles[chosen].T, middle.T
         four = [np.stack(part, axis=1) for part in ((a, p, r), (p, b, q), (r, q, c), (p, q, r))]
         triangles = np.concatenate([np.delete(triangles, chosen, axis=0), *four])
+        origins = np.concatenate([np.delete(origins, chosen), *4 * [origins[chosen]]])
         points, values = np.concatenate([points, middles]), np.concatenate([values, found])
-    return points, triangles, values
+    return points, triangles, values, origins
 
 
 def _crossings(surface: SmoothSurface, points: Floats, edges: Indices, values: Floats, level: Level) -> Floats:

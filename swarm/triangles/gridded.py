@@ -33,11 +33,10 @@ Triangles = tuple[Floats, NDArray[np.int64], Floats]
 NOTHING: Triangles = np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty((0, 3))
 
 
-def placed(pose: Pose, mesh: Triangles, edges: list[Floats]) -> tuple[Triangles, list[Floats]]:
-    """A mesh and its edges where their surface is now."""
+def placed(pose: Pose, mesh: Triangles) -> Triangles:
+    """A mesh where its surface is now."""
     vertices, triangles, normals = mesh
-    moved = pose.placed(vertices.T).T, triangles, pose.turned(normals.T).T
-    return moved, [pose.placed(edge.T).T for edge in edges]
+    return pose.placed(vertices.T).T, triangles, pose.turned(normals.T).T
 
 
 def given_box(box: Corners, pose: Pose) -> Corners:
@@ -60,9 +59,9 @@ def _mesh(values: Floats, box: Corners) -> Triangles:
     return vertices + low, triangles.astype(np.int64), normals.astype(np.float64)
 
 
-def foam(spheres: Spheres) -> tuple[Triangles, list[Floats]]:
+def foam(spheres: Spheres) -> tuple[Triangles, NDArray[np.int64]]:
     """Many balls that are cavities, where these are in no other one."""
-    (vertices, triangles, _normals), _edges = balls(spheres, max(_COARSE, int((_FOAM / len(spheres)) ** 0.5)))
+    (vertices, triangles, _normals), numbers = balls(spheres, max(_COARSE, int((_FOAM / len(spheres)) ** 0.5)))
     size = float(np.ptp(vertices, axis=0).max())
 
     def level(points: Floats) -> Floats:
@@ -71,13 +70,13 @@ def foam(spheres: Spheres) -> tuple[Triangles, list[Floats]]:
 
     # Points on a ball stay on it: between two of them no others are made that matter.
     wall = SmoothSurface(lambda points: np.zeros(len(points)), lambda points: spheres.gradient(points.T).T)
-    points, triangles, _rims = cut(wall, vertices, triangles, level)
+    points, triangles, _rims, origins = cut(wall, vertices, triangles, level)
     # Where balls of coarse triangles meet, edges would be zigzags.
-    return (points, triangles, -wall.normals(points)), []
+    return (points, triangles, -wall.normals(points)), numbers[origins]
 
 
-def balls(spheres: Spheres, count: int = _COARSE) -> tuple[Triangles, list[Floats]]:
-    """Many balls: coarse, so that thousands can be drawn."""
+def balls(spheres: Spheres, count: int = _COARSE) -> tuple[Triangles, NDArray[np.int64]]:
+    """Many balls: coarse, so that thousands can be drawn; and the number of the ball of each triangle."""
     box = np.full(3, -1.3), np.full(3, 1.3)
     grid = np.array(np.meshgrid(*_axes(box, count), indexing="ij"))
     unit, triangles, _normals = _mesh(np.sqrt((grid**2).sum(axis=0)) - 1.0, box)
@@ -85,15 +84,17 @@ def balls(spheres: Spheres, count: int = _COARSE) -> tuple[Triangles, list[Float
     center, radius = spheres.centers[:, None, :], spheres.radii[:, None, None]
     vertices = (center + radius * normals).reshape(-1, 3)
     first = len(unit) * np.arange(len(spheres))[:, None, None]
-    return (vertices, (triangles + first).reshape(-1, 3), np.tile(normals, (len(spheres), 1))), []
+    mesh = vertices, (triangles + first).reshape(-1, 3), np.tile(normals, (len(spheres), 1))
+    return mesh, np.repeat(np.arange(len(spheres)), len(triangles))
 
 
-def each_body(surface: Surface, box: Corners) -> tuple[Triangles, list[Floats]]:
-    """Bodies of another kind, each on a grid of its own."""
+def each_body(surface: Surface, box: Corners) -> tuple[Triangles, NDArray[np.int64]]:
+    """Bodies of another kind, each on a grid of its own; and the number of the body of each triangle."""
     solids = surface.solids()
-    meshes: list[Triangles] = [NOTHING]
+    meshes, numbers = [NOTHING], [np.empty(0, np.int64)]
     first = 0
-    for solid in solids[:: max(1, len(solids) // _MOST_BODIES)]:
+    for k in range(0, len(solids), max(1, len(solids) // _MOST_BODIES)):
+        solid = solids[k]
         low, high = (np.array(corner) for corner in replace(solid, side="inside").bounds())  # type: ignore[call-arg]
         low, high = own = _around(np.stack([np.maximum(low, box[0]), np.minimum(high, box[1])]), box)
         axes = _axes(own, _BODY)
@@ -102,9 +103,10 @@ def each_body(surface: Surface, box: Corners) -> tuple[Triangles, list[Floats]]:
         if not len(vertices):
             continue
         meshes.append((vertices, triangles + first, normals))
+        numbers.append(np.full(len(triangles), k))
         first += len(vertices)
     vertices, triangles, normals = (np.concatenate(parts) for parts in zip(*meshes, strict=True))
-    return (vertices, triangles, normals), []
+    return (vertices, triangles, normals), np.concatenate(numbers)
 
 
 def _around(points: Floats, box: Corners) -> Corners:

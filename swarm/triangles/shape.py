@@ -32,6 +32,8 @@ class Shape:
         height: of the ribbon that the triangles are, in a scene of two dimensions [m]; else None.
         many: whether it is that of many bodies.
         levels: its curves at some heights, the same of all shapes.
+        members: for each triangle the number of the body, or of the triangle of a mesh, that it is of; None where it is
+            of neither.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Shape:
     motion: WallMotion | None = None
     many: bool = False
     levels: list[Floats] = field(default_factory=list)
+    members: NDArray[np.int64] | None = None
 
     @property
     def wires(self) -> list[Floats]:

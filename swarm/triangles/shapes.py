@@ -44,15 +44,15 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
         if not bodies:
             found += sharp_ones[i]
             continue
-        mesh, edges = NOTHING, list[Floats]()
+        mesh, numbers = NOTHING, np.empty(0, np.int64)
         if not surface.is_there(time) or (bodies > most and surface.halves() is not None):
             pass
         elif isinstance(surface, Spheres):
-            mesh, edges = placed(at, *(foam(surface) if surface.is_foam() else balls(surface)))
+            mesh, numbers = foam(surface) if surface.is_foam() else balls(surface)
         else:
-            mesh, edges = placed(at, *each_body(surface, given_box(box, at)))
+            mesh, numbers = each_body(surface, given_box(box, at))
         solid = surface.is_solid() or i in grouped
-        found.append(Shape(name_of(scene, i), solid, *mesh, edges, surface=i, many=True))
+        found.append(Shape(name_of(scene, i), solid, *placed(at, mesh), [], surface=i, many=True, members=numbers))
     return levelled(found)
 
 
@@ -83,10 +83,11 @@ def _sharp(scene: Scene, box: Corners, time: float) -> dict[int, list[Shape]]:
         whole = scene.surfaces[part.owner]
         if not whole.body_count():
             there = part.surface.is_there(time)
-            mesh, edges = sharp.drawn(part, box, time) if there else (NOTHING, [])
+            mesh, edges, numbers = sharp.drawn(part, box, time) if there else (NOTHING, [], None)
             motion = part.surface.motion if part.place else None
             shape = Shape(
-                name_of(scene, part.owner, part.place), part.solid, *mesh, edges, None, part.owner, part.place, motion
+                name_of(scene, part.owner, part.place), part.solid, *mesh, edges, None, part.owner, part.place, motion,
+                members=numbers,
             )  # fmt: skip
             found.setdefault(part.owner, []).append(shape)
     return found

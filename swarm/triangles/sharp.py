@@ -31,7 +31,8 @@ _SEEN, _AGAIN = 0.4, 3
 
 Box = tuple[Floats, Floats]
 # Points (V, 3) [m], triangles (T, 3), normals (V, 3); and its edges.
-Walls = tuple[tuple[Floats, Indices, Floats], list[Floats]]
+# Triangles, edges, and of a mesh the number of its triangle for each of them.
+Walls = tuple[tuple[Floats, Indices, Floats], list[Floats], Indices | None]
 
 
 class _Placed(NamedTuple):
@@ -91,14 +92,14 @@ def drawn(part: Part, box: Box, time: float) -> Walls:
         for line in surface.corner_lines(float(low[2]), float(high[2])):
             edges += curves.runs(line, level(line) <= 0.0)
     here = at.placed(vertices.T).T, cells, at.turned(np.concatenate(normals).T).T
-    return here, [at.placed(edge.T).T for edge in edges]
+    return here, [at.placed(edge.T).T for edge in edges], None
 
 
 def _facets(part: Part, surface: Mesh, box: Box) -> Walls:
     """The triangles of a mesh as they are, or what of them is a wall."""
     frame, (low, high) = matrix(surface.rotation), box
     placed = _Placed(part, pose(None, 0.0), frame, low, high, float((high - low).max()))
-    points, triangles = surface.corners, surface.triangles
+    points, triangles, numbers = surface.corners, surface.triangles, np.arange(len(surface.triangles))
     edges = curves.joined(points, curves.creases(points, triangles))
     covers = _near(placed, points)
     if covers or part.doorways:
@@ -106,12 +107,12 @@ def _facets(part: Part, surface: Mesh, box: Box) -> Walls:
         level = placed.level(wall, covers, [])
         fine = [curves.finer(edge, placed.size / _FINE) for edge in edges]
         edges = [run for edge in fine for run in curves.runs(edge, level(edge) <= 0.0)]
-        points, triangles, rims = cut(wall, points, triangles, level)
+        points, triangles, rims, numbers = cut(wall, points, triangles, level)
         edges += curves.joined(points, rims)
     if surface.open:
-        return _both_sides(points, triangles), edges
+        return _both_sides(points, triangles), edges, np.tile(numbers, 2)
     # Triangles go round the normals out of the mesh.
-    return shaded(points, triangles if part.solid else triangles[:, ::-1]), edges
+    return shaded(points, triangles if part.solid else triangles[:, ::-1]), edges, numbers
 
 
 def _both_sides(points: Floats, triangles: Indices) -> tuple[Floats, Indices, Floats]:
@@ -168,7 +169,7 @@ def _with_corners(found: Cut, wall: SmoothSurface, others: list[SmoothSurface], 
     """
     size = float(np.ptp(found.points, axis=0).max())
     for one, other in itertools.combinations(others, 2):
-        points, triangles, rims = found
+        points, triangles, rims, origins = found
         walls = wall, one, other
         ends = np.unique(rims)
         ends = ends[np.max([np.abs(each.distance(points[ends])) for each in walls], axis=0) <= _AT_A_CORNER * size]
@@ -189,7 +190,8 @@ def _with_corners(found: Cut, wall: SmoothSurface, others: list[SmoothSurface], 
             made = np.stack([a, number, b], axis=1)
             points, triangles = np.concatenate([points, corners[near]]), np.concatenate([triangles, made])
             rims = np.concatenate([rims[~turns], made[:, :2], made[:, 1:]])
-        found = Cut(points, triangles, rims)
+            origins = np.concatenate([origins, np.full(len(made), -1)])
+        found = Cut(points, triangles, rims, origins)
     return found
 
 

@@ -167,6 +167,77 @@ def test_walls_that_come_and_go_are_in_the_steps_in_which_they_are_there(tmp_pat
             assert cells["solid"][cells["surface"] == i].tolist() == [int(i > 0)] * (len(corners) // 3)
 
 
+CORNERS = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
+HOLE = swarm.Sphere(0.15, (0.3, 0.3, 0.0))
+
+
+def counted_on(folder, surfaces):
+    """A run that counts the impacts of members, its log, and the steps of its walls by VTK's reader."""
+    scene = swarm.Scene(surfaces)
+    gas = swarm.fill(scene, 50, speed=1.0, seed=1)
+    path = run(folder, scene, gas, member_impacts=True, impacts=folder / "log.h5")
+    with swarm.load(path) as trajectory, swarm.load_impacts(folder / "log.h5") as log:
+        trajectory.export(folder / "out.vtkhdf")
+        table = log.table()
+    return trajectory, table, list(steps_of(folder / "out.surfaces.vtkhdf"))
+
+
+@pytest.mark.parametrize(
+    "given", [{}, {"openings": [HOLE]}, {"motion": swarm.Translation((0.05, 0.0, 0.0))}], ids=["whole", "cut", "moving"]
+)
+def test_the_wear_of_a_mesh_is_on_its_triangles(tmp_path, given):
+    """The impacts of a triangle are those of the log in its plane, also where an opening cuts triangles into parts."""
+    _trajectory, table, steps = counted_on(tmp_path, [swarm.Mesh(CORNERS, FACES, **given)])
+    assert [time for time, *_rest in steps] == pytest.approx(0.1 * np.arange(6))
+    velocity = np.array([0.05 if "motion" in given else 0.0, 0.0, 0.0])
+    for time, position, _points, cells, (_vertices, _lines, triangles) in steps:
+        hits = table[table["time"] <= time]
+        places = hits["position"] - hits["time"][:, None] * velocity
+        a, b, c = np.moveaxis(position[triangles].reshape(-1, 3, 3) - time * velocity, 1, 0)
+        normal = np.cross(b - a, c - a)
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        off = np.einsum("ck,chk->ch", normal, places[None] - a[:, None])
+        assert (np.abs(off) < 1e-9).sum(axis=1).tolist() == cells["impacts"].tolist()
+    assert cells["impacts"].min() > 5
+
+
+@pytest.mark.parametrize(
+    "surfaces",
+    [
+        [swarm.Union([swarm.Sphere(0.5), swarm.Box((0.3, 0.3, 0.3), (0.5, 0.0, 0.0))])],
+        [swarm.Box((0.6, 0.6, 0.6)), swarm.Spheres([[0.4, 0.0, 0.0], [-0.3, 0.0, 0.0]], [0.1, 0.2])],
+        [swarm.Box((0.6, 0.6, 0.6)), swarm.Boxes([[0.4, 0.0, 0.0], [-0.3, 0.0, 0.0]], (0.1, 0.2, 0.2))],
+        [swarm.Sphere(0.5), swarm.Sphere(0.2, side="outside", present=[(0.0, 0.25)])],
+    ],
+    ids=["parts", "spheres", "boxes", "a wall that goes"],
+)
+def test_impacts_of_parts_and_solids_are_on_their_triangles(tmp_path, surfaces):
+    trajectory, _table, steps = counted_on(tmp_path, surfaces)
+    with swarm.load(trajectory.path) as trajectory:
+        parts = trajectory.scene.parts
+        for k, (_time, position, _points, cells, (_vertices, _lines, triangles)) in enumerate(steps):
+            middles = position[triangles].reshape(-1, 3, 3).mean(axis=1)
+            for i, values in enumerate(trajectory.members(k)["impacts"]):
+                here = cells["surface"] == i
+                found = cells["impacts"][here]
+                if parts:
+                    expected = values[cells["part"][here]]
+                elif len(values) == 2:
+                    expected = values[(middles[here, 0] < 0.0).astype(int)]
+                else:
+                    expected = np.full(here.sum(), values[0])
+                assert found.tolist() == expected.tolist()
+    assert len(set(cells["impacts"].tolist())) > 1 or len(surfaces) == 2
+
+
+def test_walls_without_counts_have_no_data_of_members(stored, tmp_path):
+    with swarm.load(stored["cavity"]) as trajectory:
+        trajectory.export(tmp_path / "out.vtkhdf")
+    (*_rest, cells, _connected), = steps_of(tmp_path / "out.surfaces.vtkhdf")  # fmt: skip
+    assert set(cells) == {"surface", "solid"}
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_ase_reads_every_bit(stored, tmp_path, kind):
     with swarm.load(stored[kind]) as trajectory:
