@@ -152,7 +152,10 @@ def test_what_is_imported_without_an_extra_is_a_dependency():
 
 
 def test_the_sentence():
-    message = r"^a page needs the package 'nothing', which is not installed: pip install jinja2 markupsafe "
+    message = (
+        r"^a page needs the package 'nothing', which is not installed: pip install jinja2 markupsafe .*, or in swarm's "
+        r"folder the extra 'report': pip install \"\.\[report\]\"$"
+    )
     with pytest.raises(swarm.SceneError, match=message), needed_by("a page", "report"):
         importlib.import_module("nothing.within")
     with pytest.raises(ModuleNotFoundError), needed_by("a page", "report"):

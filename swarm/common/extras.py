@@ -36,5 +36,6 @@ def needed_by(what: str, extra: str) -> Iterator[None]:
             raise
         raise SceneError(
             f"{what} needs the package {package!r}, which is not installed: pip install "
-            f"{' '.join(map(shlex.quote, PACKAGES[extra].split()))}"
+            f"{' '.join(map(shlex.quote, PACKAGES[extra].split()))}, or in swarm's folder the extra {extra!r}: "
+            f'pip install ".[{extra}]"'
         ) from error

@@ -16,6 +16,7 @@ from swarm import scene_file
 from swarm.authoring import outlook
 from swarm.authoring.starters import KINDS, text_of
 from swarm.files.writer import size_of
+from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of
 
 GAS = text_of("gas").replace("count = 100", "count = 1000").replace("radius = 0.05", "radius = 0.01")
@@ -164,3 +165,15 @@ def test_what_slides_moves_or_falls(tmp_path):
     swung = outlook._loads(task(tmp_path, f"gravity = [0, 0, -9.81]\n{falls.replace('radius = 0.5', shaken)}"))
     assert swung[1].events == pytest.approx(10 * 1.0 * 20.0 * 2.0 * math.pi * 20.0)
     assert swung[0].cost >= 10.0 * loads[0].cost
+
+
+def test_steps_of_balls_take_longer_in_a_union():
+    """Measured with 400 and 800 grains that have settled: 3 to 9 times as long with 2 to 4 rooms."""
+    rooms = [swarm.Box((0.5, 0.5, 0.5), (0.0, 0.0, z)) for z in (0.0, 1.0)]
+    costs = []
+    for surfaces in ([rooms[0]], [swarm.Union(rooms)]):
+        scene = swarm.Scene(surfaces)
+        balls = swarm.fill(scene, 5, speed=1.0, radius=0.05)
+        (load,) = outlook._loads(task_of(scene, balls, swarm.Penalty(dt=1e-4, penalty=1e3), RunOptions(until=1.0)))
+        costs.append(load.cost)
+    assert costs[1] == pytest.approx(3.0 * costs[0])
