@@ -214,6 +214,22 @@ def gradient_undefined(axes, x, y, z):
     return 0.5 / np.sqrt(x), 1.0 + 0.0 * y, 0.0 * z
 
 
+def indicator(axes, x, y, z):
+    return -1.0 if x * x + y * y + z * z < axes.a * axes.a else 1.0
+
+
+def no_gradient(axes, x, y, z):
+    return 0.0, 0.0, 0.0
+
+
+def with_a_step(axes, x, y, z):
+    return x * x + y * y + z * z - (0.25 if x < 0.1 else 0.2)
+
+
+def with_a_thin_step(axes, x, y, z):
+    return phi(axes, x, y, z) + (0.5 if 0.1 < x < 0.12 else 0.0)
+
+
 BOX = ((-1, -1, -1), (1, 1, 1))
 
 
@@ -228,6 +244,19 @@ BOX = ((-1, -1, -1), (1, 1, 1))
         ((Axes(0.3, 0.4, 0.5), phi, wrong_gradient), {}, ["gradient must be the gradient of phi", "differences"]),
         ((Axes(0.3, 0.4, 0.5), nowhere, gradient_nowhere), {}, ["0 somewhere in the bounds", "above 0"]),
         ((Axes(0.3, 0.4, 0.5), undefined, gradient_undefined), {}, ["phi must be a finite number", "nan"]),
+        ((Axes(0.3, 0.4, 0.5), indicator, no_gradient), {}, ["a gradient on its surface", "got one of length 0 at ("]),
+        (
+            (Axes(0.3, 0.4, 0.5), with_a_step, gradient_nowhere),
+            {},
+            ["twice differentiable", "a jump from", "at (0.1, "],
+        ),
+        ((Axes(0.3, 0.4, 0.5), with_a_thin_step, gradient), {}, ["a jump from", "make it continuous"]),
+        (
+            (Axes(0.3, 0.4, 0.5), phi, gradient),
+            {"curvature": 22.1},
+            ["curvature", "got 22.1", "differences of the gradient give 22.2222 at (", "4096 points"],
+        ),
+        ((Axes(0.3, 0.4, 0.5), phi, gradient), {"curvature": 22.1, "side": "outside"}, ["22.2222 at ("]),
         ((Axes(0.3, 0.4, 0.5), phi, gradient), {"size": 0.0}, ["size", "above 0"]),
         ((Axes(0.3, 0.4, 0.5), phi, gradient), {"bounds": None}, ["curvature must be given where bounds are not"]),
         ((Axes(0.3, 0.4, 0.5), phi, gradient), {"bounds": [1, 2, 3]}, ["bounds", "two corners"]),
@@ -239,6 +268,60 @@ def test_errors_name_the_argument(arguments, keywords, parts):
     with pytest.raises(swarm.SceneError) as caught:
         swarm.OwnSurface(*arguments, **{"size": 0.3, "bounds": BOX, **keywords})
     assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+class Waves(NamedTuple):
+    k: float
+    scale: float
+    offset: float
+
+
+def waves(p, x, y, z):
+    return p.scale * (np.sin(p.k * (x - p.offset)) + np.cos(p.k * y) + 0.3 * np.sin(p.k * z))
+
+
+def gradient_of_waves(p, x, y, z):
+    k = p.scale * p.k
+    return k * np.cos(p.k * (x - p.offset)), -k * np.sin(p.k * y), 0.3 * k * np.cos(p.k * z)
+
+
+@pytest.mark.parametrize(("k", "offset"), [(1.0, 0.0), (60.0, 0.0), (1.0, 1e3)])
+@pytest.mark.parametrize("scale", [1e-8, 1e8])
+def test_a_curvature_that_is_true_is_never_refused(k, scale, offset):
+    """Up to the round-off of differences: far from the origin, of any scale, and for waves finer than the box."""
+    box = ((offset - 1.0, -1.0, -0.7), (offset + 1.0, 1.0, 0.7))
+    numbers = Waves(k, scale, offset)
+    for size in (1e-3, 0.5, 10.0):
+        swarm.OwnSurface(numbers, waves, gradient_of_waves, size=size, bounds=box, curvature=k * k * scale)
+
+
+def flat(p, x, y, z):
+    return x + 0.0 * y
+
+
+def gradient_of_flat(p, x, y, z):
+    return 1.0 + 0.0 * x, 0.0 * y, 0.0 * z
+
+
+def test_a_curvature_of_zero_is_true_of_a_plane():
+    assert swarm.OwnSurface((), flat, gradient_of_flat, size=1.0, bounds=BOX, curvature=0.0).curvature == 0.0
+
+
+def test_a_jump_where_no_particle_comes_is_none():
+    """In the solid, and for a kink: distances to a body have one in its middle."""
+
+    def steps(p, x, y, z):
+        return np.where(x * x + y * y + z * z < 0.1, -1.0, x * x + y * y + z * z - 0.25)
+
+    def distance(p, x, y, z):
+        return np.sqrt(x * x + y * y + z * z) - 0.5
+
+    def away(p, x, y, z):
+        r = np.sqrt(x * x + y * y + z * z)
+        return x / r, y / r, z / r
+
+    swarm.OwnSurface((), steps, gradient_nowhere, size=0.5, bounds=BOX, side="outside")
+    swarm.OwnSurface((), distance, away, size=0.5, bounds=BOX)
 
 
 class Thing:

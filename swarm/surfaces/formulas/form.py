@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -28,6 +29,11 @@ _SAFETY = 2.0
 _NOISE = 1e-6
 # Room around a solid, relative to its box's smallest width, within which the bound of the second derivatives holds.
 _MARGIN = 0.25
+# Where a jump of phi is looked for: chords of the box in equal parts, and how often a part is cut in halves.
+_CHORDS, _PARTS, _HALVINGS = 256, 16, 30
+# A given curvature is surely too small where the gradient says so by differences over a length and over twice it, which
+# agree: by this part of it, and beyond so much round-off of a gradient.
+_SURELY, _ROUND_OFF = 1e-3, 64.0
 # Points of a check that are moved onto the surface, and the moves.
 _ONTO, _MOVES = 256, 60
 # A gradient up to this length, relative to |phi|/size in the bounds, counts as 0. A gradient that differs from
@@ -106,6 +112,12 @@ class FormSurface(Parallel):
 
     def extent(self) -> float:
         return farthest(self.center) + self._form.reach()
+
+
+def _widest(a: Floats, b: Floats, measure: Callable[[Any, Any], Any]) -> tuple[Floats, Floats]:
+    """Of several pairs (7, N, several) in each row the one with the largest measure."""
+    k = measure(a, b).argmax(axis=1)[None, :, None]
+    return np.take_along_axis(a, k, axis=2)[:, :, 0], np.take_along_axis(b, k, axis=2)[:, :, 0]
 
 
 def _box_of(bounds: Any) -> Box | None:
@@ -251,10 +263,13 @@ class Form:
         if wrong.any():
             i = int(np.argmax(wrong))
             raise SceneError(f"phi must be a finite number in the bounds, got {values[i]} at {shown(points[:, i])}")
-        near = self._onto(points[:, np.argsort(np.abs(values))[:_ONTO]])
+        closest = points[:, np.argsort(np.abs(values))[:_ONTO]]
+        near = self._onto(closest)
         if not any((signs <= 0.0).any() and (signs >= 0.0).any() for signs in (values, self.value(near))):
             sign = "below" if values[0] < 0.0 else "above"
             raise SceneError(f"phi must be 0 somewhere in the bounds, got {sign} 0 everywhere in {self.box}")
+        # Without a gradient no point is moved onto the surface.
+        near = near if near.size else closest
         slopes = np.sqrt((self.slope(near) ** 2).sum(axis=0))
         flat = ~(slopes * self.size > _FLAT * np.abs(values).max())
         if flat.any():
@@ -262,6 +277,76 @@ class Form:
             raise SceneError(
                 f"phi must have a gradient on its surface, got one of length {slopes[i]:.3g} at {shown(near[:, i])}"
             )
+
+    def check_jumps(self) -> None:
+        """Raise if phi surely jumps in the admissible part of its box."""
+        ends, along = self.points(2 * _CHORDS), np.linspace(0.0, 1.0, _PARTS + 1)
+        a, b = ends[:, :_CHORDS, None], ends[:, _CHORDS:, None]
+        r = a + along * (b - a)
+        flat = r.reshape(3, -1)
+        rows = np.vstack([flat, self.value(flat), self.slope(flat)]).reshape(7, _CHORDS, -1)
+        a, b = _widest(rows[:, :, :-1], rows[:, :, 1:], self._departure)
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (a[:3] + b[:3])
+            m = np.vstack([middle, self.value(middle), self.slope(middle)])
+            a, b = _widest(np.stack([a, m], axis=2), np.stack([m, b], axis=2), self._departure)
+        apart = np.sqrt(((b - a)[:3] ** 2).sum(axis=0))
+        steepest = np.sqrt(np.maximum((a[4:] ** 2).sum(axis=0), (b[4:] ** 2).sum(axis=0)))
+        # |phi(b) - phi(a)| <= |grad phi| d + |phi''| d^2/2, and round-off
+        most = max(abs(self.bend.least), abs(self.bend.most))
+        room = steepest * apart + most * apart**2 + _NOISE * np.abs(rows[3]).max()
+        over = np.where(self._departure(a, b) > 0.0, np.abs(b[3] - a[3]) - room, 0.0)
+        i = int(np.argmax(np.nan_to_num(over, nan=0.0)))
+        if over[i] > 0.0:
+            raise SceneError(
+                f"phi must be twice differentiable in the bounds, got a jump from {a[3, i]:.6g} to {b[3, i]:.6g} at "
+                f"{shown(a[:3, i])}; make it continuous, give closer bounds, or take several surfaces"
+            )
+
+    def _departure(self, a: Any, b: Any) -> Any:
+        """How far differences of phi are from those of its gradient; 0 unless a point of the two is admissible.
+
+        Each of the two is (7, ...): points, phi and its gradient.
+        """
+        side = side_sign(self.side)
+        with np.errstate(all="ignore"):
+            by_gradient = 0.5 * ((a[4:] + b[4:]) * (b[:3] - a[:3])).sum(axis=0)
+            off = np.abs(b[3] - a[3] - by_gradient)
+        return np.where((side * a[3] <= 0.0) | (side * b[3] <= 0.0), np.nan_to_num(off, nan=0.0), 0.0)
+
+    def check_curvature(self, curvature: float) -> None:
+        """Raise if second derivatives at points of the admissible part of the box are surely above a given bound."""
+        low, high = np.array(self.domain())[:, :, None]
+        step = _DIFFERENCE * self.size
+        inner = low + 2.0 * step, high - 2.0 * step
+        points = inner[0] + (inner[1] - inner[0]) * np.random.default_rng(0).random((3, _SAMPLES))
+        points = points[:, side_sign(self.side) * self.value(points) <= 0.0]
+        found = self._sharpness(points, step)
+        points = points[:, np.argsort(-np.nan_to_num(found, nan=0.0))[:_ONTO]]
+        once, twice = self._sharpness(points, step), self._sharpness(points, 2.0 * step)
+        # Where phi is smooth the two differ by four times the error of the first; at a kink it is half of the other.
+        least = np.minimum(once, twice) - 4.0 * np.abs(once - twice)
+        room = _ROUND_OFF * EPSILON / step * np.abs(self.slope(points)).max(axis=0, initial=0.0)
+        sure = np.nan_to_num(least - room, nan=0.0)
+        if (sure > (1.0 + _SURELY) * curvature).any():
+            i = int(np.argmax(sure))
+            raise SceneError(
+                f"curvature must not be below the second derivative of phi in any direction, got {curvature:g}, but "
+                f"differences of the gradient give {once[i]:.6g} at {shown(points[:, i])}, the largest of {_SAMPLES} "
+                "points; give a number above it, or leave curvature out"
+            )
+
+    def _sharpness(self, points: Floats, step: float) -> Floats:
+        """The largest |second derivative| of phi in any direction at each point, by differences of the gradient."""
+        entries = self._entries(points, step * np.eye(3)[:, :, None])
+        matrices = np.nan_to_num(entries, nan=0.0, posinf=0.0, neginf=0.0)[[0, 3, 5, 3, 1, 4, 5, 4, 2]]
+        return np.asarray(2.0 * np.abs(np.linalg.eigvalsh(matrices.T.reshape(-1, 3, 3))).max(axis=1))
+
+    def _entries(self, points: Floats, step: Floats) -> Floats:
+        """The entries of side H, H = grad grad phi/2, at points by differences of the gradient, (6, N)."""
+        side = side_sign(self.side)
+        rows = [0.125 * side / step.max() * (self.slope(points + one) - self.slope(points - one)) for one in step]
+        return np.array([rows[i][j] + rows[j][i] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))])
 
     def _onto(self, points: Floats) -> Floats:
         """Points moved onto the surface along the gradient; those that stay in the box."""
@@ -292,9 +377,7 @@ class Form:
         side = side_sign(self.side)
         # Flights are in the admissible part only.
         points = points[:, side * self.value(points) <= 0.0]
-        step = _DIFFERENCE * self.size * np.eye(3)[:, :, None]
-        rows = [0.125 * side / step.max() * (self.slope(points + one) - self.slope(points - one)) for one in step]
-        entries = np.array([rows[i][j] + rows[j][i] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))])
+        entries = self._entries(points, _DIFFERENCE * self.size * np.eye(3)[:, :, None])
         if not entries.size or not np.isfinite(entries).all():
             raise SceneError("curvature must be given: the gradient is not finite everywhere in the bounds")
         least, most = entries.min(axis=1), entries.max(axis=1)

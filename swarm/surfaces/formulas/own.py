@@ -1,5 +1,6 @@
 """A surface by your own phi and its gradient: Python functions that become part of the kernels."""
 
+import functools
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -32,14 +33,14 @@ class OwnSurface(FormSurface):
             coordinates of phi. Where the cavity is open (phi < 0 on a face), the box that particles stay in.
         center: where the origin of phi's coordinates is [m].
         side: "inside" or "outside", the admissible part.
-        curvature: a number that the second derivative of phi in any direction never exceeds, in the bounds (of a solid:
-            a quarter larger) or, without bounds, wherever particles go. Then the first hit of a flight is never missed.
-            None: the second derivatives are taken to be in twice the range in which differences of the gradient at 4096
-            points of the bounds find them; features that are finer than these points may be missed.
+        curvature: a number that the size of the second derivative of phi in any direction never exceeds, in the bounds
+            (of a solid: a quarter larger) or, without bounds, wherever particles go. Then the first hit of a flight is
+            never missed. None: the second derivatives are taken to be in twice the range in which differences of the
+            gradient at 4096 points of the bounds find them; features that are finer than these points may be missed.
 
     Raises:
-        SceneError: an argument is out of its range, phi is not finite or does not change its sign in the bounds, or the
-            gradient is not that of phi or vanishes on the surface.
+        SceneError: an argument is out of its range, phi is not finite, jumps or does not change its sign in the bounds,
+            the gradient is not that of phi or vanishes on the surface, or the second derivatives exceed `curvature`.
 
     >>> import collections
     >>> Radius = collections.namedtuple("Radius", "r")
@@ -83,15 +84,8 @@ class OwnSurface(FormSurface):
 
     def _made(self) -> Form:
         kind = class_of(self.parameters, self.phi_function, self.gradient_function)
-        form = Form(kind, tuple(map(float, self.parameters)), self.box, self.length, self.side)
-        if self.curvature is None and self.box is None:
-            raise SceneError(
-                "curvature must be given where bounds are not, got neither; it bounds |phi''| in any direction"
-            )
-        form.check_gradient()
-        if form.box is not None:
-            form.check()
-        return replace(form, bend=form.sampled_bend() if self.curvature is None else Bend.of_magnitude(self.curvature))
+        values = tuple(map(float, self.parameters))
+        return _form_of(kind, values, self.box, self.length, self.side, self.curvature)
 
     def require_compiled(self) -> None:
         if is_disabled():
@@ -113,6 +107,28 @@ class OwnSurface(FormSurface):
         given |= {"bounds": self.box, "center": self.center, "side": self.side, "curvature": self.curvature}
         given |= {one.name: getattr(self, one.name) for one in fields(Surface) if not is_left_out(self, one)}
         return {"kind": "own", **{key: value for key, value in given.items() if value is not None}}
+
+
+# A scene is made again in each process, run and copy, and the checks take 0.2 s.
+@functools.lru_cache(maxsize=64)
+def _form_of(
+    kind: Any, values: tuple[float, ...], box: Box | None, size: float, side: str, curvature: float | None
+) -> Form:
+    """The checked form of functions: of a class of numbers and the values of its parameters."""
+    form = Form(kind, values, box, size, side)
+    if curvature is None and box is None:
+        raise SceneError(
+            "curvature must be given where bounds are not, got neither; it bounds |phi''| in any direction"
+        )
+    form.check_gradient()
+    if box is not None:
+        form.check()
+        if curvature is not None:
+            form.check_curvature(curvature)
+    form = replace(form, bend=form.sampled_bend() if curvature is None else Bend.of_magnitude(curvature))
+    if box is not None:
+        form.check_jumps()
+    return form
 
 
 # --- Does it compile? ---------------------------------------------------------------------------------
