@@ -5,10 +5,12 @@ compiled ones a kernel is. So they stay without end when scenes that were are me
 """
 
 import itertools
+import math
 import re
 import signal
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -30,7 +32,8 @@ from swarm.run.watch import Watch
 FLOOR = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0)], (0.0, 0.0, -9.81))
 # The first flies, and does not come back; the second slides.
 TWO = swarm.Particles([[0.0, 0.2], [0.0, 0.0], [1.0, 0.0]], [[1.0, 1.0], [0.0, 0.0], [50.0, 0.0]])
-NOWHERE = "no time passes; .*it is an error of swarm: please report it with the scene"
+NOWHERE = "no time passes; .*"
+REPORT = "; if nothing is special about the place, it is an error of swarm: please report it with the scene$"
 
 
 def in_turn(method, walls, gravity, share, i):
@@ -61,9 +64,47 @@ def test_turns_between_kernels_without_time_are_bounded(monkeypatch, every):
     monkeypatch.setattr(careful, "_step", in_turn)
     monkeypatch.setattr(careful, "return_particle", lambda *about: None)
     where = r"at \(0\.2, 0, 0\) m, at surfaces\[0\] \(Plane\) at 0(\.\d+|e-\d+)? s"
-    with pytest.raises(swarm.RunError, match=rf"failed at particle 1: .*{NOWHERE}; it is {where}"):
+    with pytest.raises(swarm.RunError, match=rf"failed at particle 1: .*{NOWHERE}; it is {where}{REPORT}"):
         run_in_plain_python(FLOOR, TWO, **({} if every is None else {"every": every}))
     assert 1000 <= 2 * len(turned) <= 3 * turns.MOST
+
+
+class Size(NamedTuple):
+    a: float
+
+
+def of_octahedron(p, x, y, z):
+    return abs(x) + abs(y) + abs(z) - p.a
+
+
+def gradient_of_octahedron(p, x, y, z):
+    return math.copysign(1.0, x), math.copysign(1.0, y), math.copysign(1.0, z)
+
+
+KINKED = swarm.OwnSurface(
+    Size(0.5), of_octahedron, gradient_of_octahedron, size=0.5, bounds=((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
+)
+MAY_HAVE = (
+    r"; phi of surfaces\[{}\] \(OwnSurface\) must be twice differentiable, but is user-defined and may have a jump, a "
+    r"kink or a second derivative above `curvature`"
+)
+
+
+def test_what_gets_nowhere_names_a_user_defined_surface(monkeypatch):
+    """Not the wall that is near alone, and it is no error of swarm then."""
+    monkeypatch.setattr(contact_events, "_decide", in_turn)
+    monkeypatch.setattr(careful, "_step", in_turn)
+    monkeypatch.setattr(careful, "return_particle", lambda *about: None)
+    kinked = replace(KINKED, side="outside", center=(0.0, 0.0, 50.0))
+    scene = swarm.Scene([*FLOOR.surfaces, kinked], FLOOR.gravity)
+    with pytest.raises(swarm.RunError, match=rf"{NOWHERE}; it is at .* at surfaces\[0\] .*{MAY_HAVE.format(1)}$"):
+        run_in_plain_python(scene, TWO)
+
+
+def test_a_point_beyond_a_kink_names_what_phi_must_be():
+    scene = swarm.Scene([KINKED])
+    with pytest.raises(swarm.RunError, match=rf"m outside surfaces\[0\] \(OwnSurface\){MAY_HAVE.format(0)}$"):
+        run_in_plain_python(scene, swarm.fill(scene, 5, speed=2.0, seed=1))
 
 
 def test_a_flight_that_gets_nowhere_is_bounded(monkeypatch):
@@ -74,7 +115,9 @@ def test_a_flight_that_gets_nowhere_is_bounded(monkeypatch):
         return False, False, False
 
     monkeypatch.setattr(block, "_pass", nothing)
-    with pytest.raises(swarm.RunError, match=rf"failed at particle 0: .*{NOWHERE}; it is at \(0, 0, 1\) m.* at 0 s"):
+    with pytest.raises(
+        swarm.RunError, match=rf"failed at particle 0: .*{NOWHERE}; it is at \(0, 0, 1\) m.* at 0 s{REPORT}"
+    ):
         run_in_plain_python(FLOOR, TWO)
     assert len(passes) <= 2 * block.LOOK
 
@@ -91,7 +134,9 @@ def test_a_slide_that_gets_nowhere_is_bounded(monkeypatch):
     monkeypatch.setattr(slide, "compose", creep)
     monkeypatch.setattr(slide, "end_steps", lambda *about: None)
     monkeypatch.setattr(slide.Slide, "account", lambda *about: None)
-    with pytest.raises(swarm.RunError, match=rf"failed at particle 1: .*{NOWHERE}; it is at \(0\.2, 0, 0\) m"):
+    with pytest.raises(
+        swarm.RunError, match=rf"failed at particle 1: .*{NOWHERE}; it is at \(0\.2, 0, 0\) m.*{REPORT}"
+    ):
         run_in_plain_python(FLOOR, TWO)
     assert len(passes) <= 2 * slide.LOOK
 
@@ -149,7 +194,16 @@ def test_a_frame_that_hardly_goes_on_is_a_warning(monkeypatch, caplog):
         caplog.handler.removeFilter(ends)
     message = caplog.messages[-1]
     assert re.match(r"frame 1 hardly goes on: .* the last one is particle 1, at \(0\.2, 0, 0\) m", message)
-    assert "let slow particles rest" in message
+    assert "let slow particles rest. The run goes on" in message
+
+
+@pytest.mark.parametrize(("cause", "words"), [("", "rest. The run"), ("phi may jump", "rest; phi may jump. The run")])
+def test_the_warning_names_what_else_may_be_the_cause(monkeypatch, caplog, cause, words):
+    monkeypatch.setattr(progress, "LOOK", 0.0)
+    still = progress.Standstill(lambda: cause)
+    for _look in range(3):
+        still.look(1, 0.0, None, 0.0)
+    assert words in caplog.messages[-1]
 
 
 def test_impacts_without_time_between_them_are_no_standstill():

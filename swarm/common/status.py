@@ -45,5 +45,5 @@ _SENTENCES = {
     Status.TOO_DEEP: "it has passed the middle of what it meets, or a ball the surface: the contact is too soft for "
     "the speed; use a larger penalty, or a smaller speed",
     Status.TIMELESS: "it goes from step to step, or from wall to wall, and no time passes; start it elsewhere, or end "
-    "the run before; if nothing is special about the place, it is an error of swarm: please report it with the scene",
+    "the run before",
 }

@@ -210,7 +210,7 @@ class CollidingRun(BaseRun):
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         place, _v = self._flock.at(self._box.pull, item, self._flock.time(item))
-        return failures.after(moment - span, item, status, place, self._now())
+        return failures.after(self._scene, moment - span, item, status, place, self._now())
 
     def collisions(self) -> float:
         """How many there were since the start."""

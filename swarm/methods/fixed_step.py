@@ -216,9 +216,19 @@ def whole_steps(name: str, duration: float, dt: float) -> float:
     if abs(duration / dt - steps) > _WHOLE:
         raise SceneError(
             f"{name} must be a whole number of steps, got {name} = {duration:g} s with dt = {dt:g} s, which is "
-            f"{duration / dt:.6g} steps"
+            f"{duration / dt:.6g} steps; take {name} = {_shortest(max(1, steps), dt)} s"
         )
     return float(steps)
+
+
+def _shortest(steps: int, dt: float) -> str:
+    """The time of so many steps in the fewest digits, six or more, that count as these.
+
+    >>> _shortest(27843, 2e-5), _shortest(12345678, 1e-3)
+    ('0.55686', '12345.678')
+    """
+    texts = (f"{steps * dt:.{digits}g}" for digits in range(6, 17))
+    return next((text for text in texts if abs(float(text) / dt - steps) <= _WHOLE), repr(steps * dt))
 
 
 def steps_within(duration: float, dt: float) -> float:

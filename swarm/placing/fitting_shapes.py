@@ -41,5 +41,15 @@ def require_shapes(scene: Scene, radius: Floats) -> None:
             raise SceneError(
                 f"radius must be below {surface.largest_ball():.6g} m, the smallest radius of curvature{sure} of "
                 f"surfaces[{i}] ({type(surface).__name__}), so that no ball touches it at several points at once, got "
-                f"{radius[largest]:g} m of particle {largest}; use smaller balls, or a rounder surface"
+                f"{radius[largest]:g} m of particle {largest}; use smaller balls, or a rounder surface{_surer(surface)}"
             )
+
+
+def _surer(surface: Surface) -> str:
+    """How a larger radius of curvature becomes certain, where that is known only by a bound of second derivatives."""
+    bounds = [part.curvature for part in surface.surfaces() if hasattr(part, "curvature")]
+    if not bounds:
+        return ""
+    if None in bounds:
+        return ", or give `curvature`, or closer `bounds`, by which a larger radius may be certain"
+    return ", or a smaller `curvature` where that is true"

@@ -18,6 +18,9 @@ from ..surfaces.wall_law import leave_of, mirrored, sentence_of, why_wrong
 from .preflight import softness
 from .starting_state import Seeding
 
+# Of a particle that does not go on, where no user-defined function may be the cause.
+_REPORT = "; if nothing is special about the place, it is an error of swarm: please report it with the scene"
+
 
 def of_frame(
     compiled: CompiledScene, method: Method, state: State, end: tuple[Status, int], moment: float, seeding: Seeding
@@ -26,7 +29,7 @@ def of_frame(
     (status, particle), first, scene = end, seeding.first, compiled.scene
     sentence = f"{_failed(moment)} {first + particle}: {status.sentence}"
     if status in (Status.STALLED, Status.TIMELESS):
-        sentence += _place(scene, state, particle, moment)
+        sentence += _place(scene, state, particle, moment) + _cause(scene, status)
     if status == Status.STALLED and scene.moves():
         sentence += ": walls that move have closed on it; end the run before"
     if status == Status.TOO_FAST:
@@ -43,12 +46,34 @@ def of_frame(
     return sentence
 
 
-def after(before: float, particle: int, status: Status, place: Any, moment: float) -> str:
+def after(scene: Scene, before: float, particle: int, status: Status, place: Any, moment: float) -> str:
     """The sentence about a frame after a time [s] that ended with this particle at its place at a moment [s]."""
     return (
         f"the frame after {before:g} s failed at particle {particle}: {status.sentence}; it is at "
-        f"{shown(place, 6)} m at {moment:.9g} s"
+        f"{shown(place, 6)} m at {moment:.9g} s{_cause(scene, status)}"
     )
+
+
+def _cause(scene: Scene, status: Status) -> str:
+    """What else the frame may have failed for: a user-defined phi, or the engine itself."""
+    if text := unproved(scene):
+        return f"; {text}"
+    return _REPORT if status == Status.TIMELESS else ""
+
+
+def unproved(scene: Scene) -> str:
+    """A sentence about each user-defined surface, of which the engine assumes that phi is smooth; else empty."""
+    return "; ".join(text for i in range(len(scene.surfaces)) if (text := _unproved(scene, i)))
+
+
+def _unproved(scene: Scene, i: int) -> str:
+    surface, texts = scene.surfaces[i], dict[str, None]()
+    for part, place in zip(surface.surfaces(), surface.places(), strict=True):
+        if may := part.unproved():
+            of = "".join(f".parts[{k}]" for k in place)
+            named = f"surfaces[{i}]{of} ({type(part).__name__})"
+            texts[f"phi of {named} must be twice differentiable, but is user-defined and may have {may}"] = None
+    return "; ".join(texts)
 
 
 def require_admissible(
@@ -70,7 +95,8 @@ def require_admissible(
     if outside.any():
         wall, particle = np.unravel_index(int(np.argmax(distances * outside)), distances.shape)
         depth = f"{distances[wall, particle]:.3g} m outside {_named(scene, int(wall))}"
-        raise RunError(f"{_failed(moment)} {first + particle}: it is {depth}")
+        phi = "; ".join(filter(None, (depth, _unproved(scene, int(wall)))))
+        raise RunError(f"{_failed(moment)} {first + particle}: it is {phi}")
 
 
 def sentence_of_coming(

@@ -19,6 +19,7 @@ from ..kernel.cache import kernels_compiled
 from ..kernel.compiling import Compilations
 from ..particles import Particles
 from ..state import Absorbed, Multipliers
+from . import failures
 from .base import BaseRun
 from .engines import run_of
 from .impacts import log_of
@@ -86,7 +87,8 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
         warn_open()
     if not task.is_shard:
         hints.give(task)
-    until, span_of, kept, still = task.options.until, task.method.span, Columns(), Standstill()
+    until, span_of, kept = task.options.until, task.method.span, Columns()
+    still = Standstill(lambda: failures.unproved(task.scene))
     with explained(task), _begun(task, session) as (run, writer, show, (log, tally, _counters), measures):
         with run, writer or contextlib.nullcontext(lambda *frame: None) as write:
             for number, before, moment in session.frames(task.options.times):

@@ -146,9 +146,13 @@ class _Recent:
 
 
 class Standstill:
-    """A warning, once in a run, of a frame that hardly goes on."""
+    """A warning, once in a run, of a frame that hardly goes on.
 
-    def __init__(self) -> None:
+    `cause` gives a sentence about what else in the scene may be the cause, or an empty one.
+    """
+
+    def __init__(self, cause: Callable[[], str] = str) -> None:
+        self._cause = cause
         self._shares, self._about, self._has_warned, self._is_slow = Pace(LOOK), (0, 0.0), False, False
 
     def look(self, number: int, share: float, behind: tuple[int, list[float]] | None, compiled: float) -> None:
@@ -171,12 +175,13 @@ class Standstill:
         last = ""
         if behind is not None:
             last = f"; the last one is particle {behind[0]}, at ({', '.join(f'{x:.6g}' for x in behind[1])}) m"
+        cause = f"; {text}" if (text := self._cause()) else ""
         _LOG.warning(
             "frame %d hardly goes on: in %.0f s particles have done %.2g of it%s. A particle meets its walls almost "
             "without time between where walls touch but do not overlap, as boxes in a row, where friction holds it in "
             "a corner of walls that turn, or where a user-defined method or law takes energy at each impact and lets "
-            "no particle rest: let such walls overlap, round the corner off, or let slow particles rest. The run goes "
-            "on; end it with Ctrl-C", number, elapsed, advanced, last,
+            "no particle rest: let such walls overlap, round the corner off, or let slow particles rest%s. The run "
+            "goes on; end it with Ctrl-C", number, elapsed, advanced, last, cause,
         )  # fmt: skip
 
 

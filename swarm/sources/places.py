@@ -184,7 +184,8 @@ class PointBatches:
                 next_report = 2 * tried
                 _LOG.warning(
                     "%s: still looking for places of births, %d of %d found after %d points tried on its wall or in "
-                    "its volume, of which few are in the source",
+                    "its volume, of which few are in the source; give a smaller where=, or a within= that bounds the "
+                    "part of it in the vessel",
                     self._name, count, n, tried,
                 )  # fmt: skip
         points, normals = np.concatenate(found, axis=1).reshape(2, 3, n)

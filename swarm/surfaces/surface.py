@@ -253,6 +253,10 @@ class Surface(Validated):
         """The admissible side as a union of rooms: intersections of surfaces without parts."""
         return ((self,),)
 
+    def unproved(self) -> str:
+        """What a user-defined phi may have and must not, for errors; empty where the engine knows that it has not."""
+        return ""
+
     def surfaces(self) -> tuple["Surface", ...]:
         """The surfaces of all rooms, one after the other, with what is given to the whole."""
         return (self,)

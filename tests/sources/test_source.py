@@ -192,6 +192,7 @@ def test_a_long_search_for_places_is_reported(caplog, monkeypatch):
         "1048576",
     ]
     assert reports[0].startswith("sources[0]: still looking")
+    assert reports[0].endswith("give a smaller where=, or a within= that bounds the part of it in the vessel")
 
 
 def test_runs_that_support_no_sources():

@@ -295,6 +295,16 @@ def test_a_curvature_that_is_true_is_never_refused(k, scale, offset):
         swarm.OwnSurface(numbers, waves, gradient_of_waves, size=size, bounds=box, curvature=k * k * scale)
 
 
+@pytest.mark.parametrize(
+    ("curvature", "words"),
+    [(None, "or give `curvature`, or closer `bounds`, by which"), (23.0, "or a smaller `curvature` where that is")],
+)
+def test_a_ball_that_is_too_large_names_what_may_make_a_larger_one_certain(curvature, words):
+    scene = swarm.Scene([ellipsoid(curvature=curvature)])
+    with pytest.raises(swarm.SceneError, match="use smaller balls, or a rounder surface, " + words):
+        swarm.fill(scene, 2, speed=1.0, radius=0.25)
+
+
 def flat(p, x, y, z):
     return x + 0.0 * y
 

@@ -77,6 +77,9 @@ class Formula(FormSurface):
         parameters = None if self.parameters is None else frozenset(self.parameters.items())
         return hash((*(parameters if f.name == "parameters" else getattr(self, f.name) for f in fields(self)),))
 
+    def unproved(self) -> str:
+        return "" if self.curvature is None else "a second derivative above `curvature`"
+
     def _made(self) -> Form:
         checks.assign(self, parameters=_checked(self.parameters))
         if not isinstance(self.formula, str):

@@ -101,6 +101,9 @@ class OwnSurface(FormSurface):
             except (NumbaError, UnsupportedBytecodeError) as error:
                 raise _not_compiled(function.__name__, str(error)) from None
 
+    def unproved(self) -> str:
+        return "a jump, a kink or a second derivative above `curvature`"
+
     def table(self) -> dict[str, Any]:
         """Its table in a file: enough to recognise it, not to make it again."""
         given = {"code": self._form.kind.__name__, "parameters": self.parameters._asdict(), "size": self.length}
