@@ -4,6 +4,7 @@ import threading
 import time
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from swarm.kernel import cache
@@ -35,7 +36,7 @@ def test_it_says_what_and_how_far(monkeypatch):
     ]
 
 
-@pytest.mark.parametrize("run", ["particles", "bodies", "reacting"])
+@pytest.mark.parametrize("run", ["particles", "bodies", "reacting", "balls"])
 def test_every_kernel_of_a_run_has_words(run):
     import swarm
     from swarm.kernel import compiling
@@ -47,6 +48,8 @@ def test_every_kernel_of_a_run_has_words(run):
     walls[0] = walls[0] if run != "reacting" else swarm.Plane((0.0, 0.0, -1.0), 0.0, mass=1.0)
     scene = swarm.Scene(walls, None if run == "reacting" else (0.0, 0.0, -9.81))
     start, method = swarm.Particles((0.0, 0.0, 0.1), (1.0, 0.0, 0.0)), swarm.Impact()
+    if run == "balls":
+        start.radius = np.array([0.01])
     if run == "bodies":
         start, method = swarm.place(scene, swarm.dumbbell(0.1, 1.0), 1), swarm.Impact(dt=1e-2)
     with run_of(task_of(scene, start, method, RunOptions(until=1.0, compile="never"))) as made:

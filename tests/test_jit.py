@@ -529,7 +529,10 @@ def test_compilations_are_reported_and_cached_kernels_are_not(tmp_path, monkeypa
     sentence = "compiling a kernel, once: one_more"
     assert sentences == caplog.messages == [sentence]
     assert spent.seconds > 0.0
-    first(1)  # no observer
+    caplog.clear()
+    with caplog.at_level("INFO", "swarm"):
+        first(1)  # outside of a run, as `pack`
+    assert caplog.messages == ["compiling the kernel one_more for this kind of scene, once"]
     with cache.kernels_compiled(sentences.append) as spent:
         assert _jit.kernel(one_more)(1.0) == 2.0  # as another process does
     assert sentences == [sentence]

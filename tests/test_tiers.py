@@ -16,6 +16,7 @@ from swarm.bodies.body_run import BodyRun
 from swarm.kernel import cache
 from swarm.run import tiers
 from swarm.run.engine import Run
+from swarm.run.machine import run_of
 from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of
 
@@ -150,6 +151,7 @@ FOUND = """
 import logging, swarm
 from swarm.kernel import cache, machine_code
 from swarm.run.engine import Run
+from swarm.run.machine import run_of
 found, real = [], cache.is_compiled
 cache.is_compiled = lambda *call: found.append(real(*call)) or found[-1]
 logging.basicConfig(level="INFO", format="%(message)s")
@@ -206,6 +208,21 @@ def test_a_run_of_few_particles_imports_no_compiler(tmp_path):
 def test_another_word_is_refused():
     with pytest.raises(swarm.SceneError, match="compile must be one of 'auto', 'always' and 'never', got 'alwyas'"):
         swarm.simulate(SPHERE, swarm.fill(SPHERE, 2, speed=1.0), swarm.Impact(), until=1.0, compile="alwyas")
+
+
+def test_the_first_look_at_balls_ends_plain_python_where_its_time_is_used_up(monkeypatch):
+    """In a union each ball takes 0.1 s of it. Other runs of the process know of it."""
+    monkeypatch.setattr(tiers, "_spent", {})
+    particles = swarm.Particles(np.linspace([-0.4] * 3, [0.4] * 3, 20).T, np.ones((3, 20)), 1.0, None, 0.01)
+    task = task_of(swarm.Scene([swarm.Box((0.5, 0.5, 0.5))]), particles, swarm.Impact(), RunOptions(until=1.0))
+    calls = []
+    with run_of(task) as run:
+        run._tier.is_plain, run._tier.remaining, run._tier._missing = True, 0.0, ["begin"]
+        monkeypatch.setattr(run, "_call", lambda kernel, *given: calls.append((run._tier.is_plain, *given[-2:])))
+        run._in_chunks("begin", "box")
+        assert not run._tier.is_plain
+    assert calls == [(True, 0, 8), (False, 8, 20)]
+    assert tiers._spent["begin"] > 0.0
 
 
 # --- Plain Python is counted over all runs of a process ------------------------------------------------------------

@@ -193,9 +193,7 @@ class CollidingRun(BaseRun):
 
     def _look_anew(self, now: float) -> None:
         """Find what is next for every ball from a time of the epoch on [s]; negative: at the start."""
-        n, size = self.state.mass.size, self._at_once()
-        for first in range(0, n, size):
-            self._call(events.begin, self._box, self._flock, now, first, min(first + size, n))
+        self._in_chunks(events.begin, self._box, self._flock, now)
         self._call(events.order, self._flock)
 
     def _set_window(self) -> None:

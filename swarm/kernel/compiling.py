@@ -24,6 +24,11 @@ _WORDS = {
     "stored": "the energy of contacts",
     "show": "frames of balls",
     "settle": "walls that react, at the end of a frame",
+    "mark": "cells near walls",
+    "begin": "what each ball meets first",
+    "order": "the order of events",
+    "_find_free": "free places",
+    "distances_from": "distances from walls",
 }
 
 Calls = Iterable[tuple[Any, tuple[Any, ...]]]
@@ -44,7 +49,11 @@ class Compilations:
         """The sentence before a kernel is compiled. What slides or rests on the way needs more of them."""
         left = sum(not cache.is_compiled(*call) for call in self.calls())
         self._begun += 1
-        name = kernel.__name__
-        words = f"the kernel of {_WORDS[name]}" if name in _WORDS else f"the kernel {name}"
-        number = f"{self._begun} of {self._begun - 1 + max(1, left)}"
-        return f"compiling {words} ({number}) for this kind of scene, once"
+        return sentence_of(kernel, f" ({self._begun} of {self._begun - 1 + max(1, left)})")
+
+
+def sentence_of(kernel: Any, number: str = "") -> str:
+    """The sentence before a kernel is compiled, with its number among those that a run needs."""
+    name = kernel.__name__
+    words = f"the kernel of {_WORDS[name]}" if name in _WORDS else f"the kernel {name}"
+    return f"compiling {words}{number} for this kind of scene, once"

@@ -28,8 +28,9 @@ from numba.extending import typeof_impl
 from numba.np import linalg as blas
 
 from . import emission
-from .cache import base, is_disabled, listeners
+from .cache import Listener, base, is_disabled, listeners
 from .compilers import KernelCompiler, LongKernelCompiler, PartCompiler, WideLongKernelCompiler, features_of
+from .compiling import sentence_of
 from .deferred import loaded
 from .digest import key_of_kernel, was_compiled
 from .entries import File, Key, is_own, key_of
@@ -120,16 +121,20 @@ def _typeof_kernel(kernel: Kernel, _context: Any) -> Any:
     return numba.typeof(kernel.compiled)
 
 
+# Where no context is open, as in `pack`, the log alone is told.
+_unlistened = Listener(lambda _sentence: None, sentence_of)
+
+
 class _Announcer(event.Listener):  # type: ignore[misc]
     """Hands on to the contexts that are open when a compilation begins and ends."""
 
     def on_start(self, compiled: Any) -> None:
         function = compiled.data["dispatcher"]
-        for one in tuple(listeners):
+        for one in tuple(listeners) or (_unlistened,):
             one.begins(function, function in _kernels)
 
     def on_end(self, compiled: Any) -> None:
-        for one in tuple(listeners):
+        for one in tuple(listeners) or (_unlistened,):
             one.ends()
 
 

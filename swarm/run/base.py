@@ -38,7 +38,7 @@ _GLANCE = 0.1
 # A kernel is done with fewer particles than this before another thread is awake.
 _FEW = 4096
 # The particles between two looks at the halt, compiled and in plain Python: some 0.1 s of work.
-_AT_ONCE, _AT_ONCE_PLAIN = 1 << 16, 64
+_AT_ONCE, _AT_ONCE_PLAIN = 1 << 16, 8
 Arrays = dict[str, NDArray[Any]]
 T = TypeVar("T")
 
@@ -339,6 +339,17 @@ class BaseRun:
         threads = 1 if self._tier.is_plain or self.state.mass.size < _FEW else self._threads
         ends = np.linspace(first, last, threads + 1).astype(int).tolist()
         self._called(kernel, [(*arguments, *part) for part in itertools.pairwise(ends)], latest)
+
+    def _in_chunks(self, kernel: Any, *arguments: Any) -> None:
+        """Call a kernel for all particles, some at a time; compiled from where the time for plain Python ends."""
+        began, first, n = time.perf_counter(), 0, self.state.mass.size
+        while first < n:
+            last = min(first + self._at_once(), n)
+            self._call(kernel, *arguments, first, last)
+            first = last
+            # In a union a ball takes 0.1 s of plain Python.
+            if self._tier.is_plain and (seconds := time.perf_counter() - began) > self._tier.remaining:
+                self._tier.end_plain(seconds)
 
     def _at_once(self) -> int:
         """How many particles a kernel takes between two looks at the halt."""

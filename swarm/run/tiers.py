@@ -79,6 +79,11 @@ class Tier:
                 for kind in self._missing:
                     _spent[kind] = _spent.get(kind, 0.0) + seconds
 
+    def end_plain(self, seconds: float) -> None:
+        """Count a time of plain Python, and end it, as it is used up before a frame began."""
+        self.spend(seconds)
+        self.remaining, self._later, self.is_plain = 0.0, 0.0, False
+
     def kernel(self, kernel: Any) -> Any:
         """The function that this tier calls for a kernel."""
         plain = cache.in_python(kernel)
