@@ -121,7 +121,7 @@ def _typeof_kernel(kernel: Kernel, _context: Any) -> Any:
     return numba.typeof(kernel.compiled)
 
 
-# Where no context is open, as in `pack`, the log alone is told.
+# Where no context is open, as in `pack`, the sentence goes to the log alone.
 _unlistened = Listener(lambda _sentence: None, sentence_of)
 
 
