@@ -156,6 +156,58 @@ def test_a_ball_behind_a_face_that_is_seen_flies_on(pull):
         assert time == pytest.approx(first, abs=1e-12)
 
 
+# Of a wall of the first box and one of the second, 0.3 is an edge: between the end of both boxes and the sphere.
+SHORT = swarm.Union([
+    swarm.Box((1.0, 1.0, 1.0), (-0.8, 0.0, 0.0)), swarm.Box((0.7, 0.9, 0.5), (0.6, 0.2, 0.1)),
+    swarm.Sphere(0.9, (0.0, 0.5, 0.8)),
+])  # fmt: skip
+
+
+@pytest.mark.parametrize("radius", [0.02, 0.1])
+def test_a_ball_meets_an_edge_that_is_a_tenth_of_the_way_through_its_rooms(radius):
+    velocity = np.array([0.0, 0.3, -0.3])
+    time, meets = met(SHORT, radius, (0.05, 0.7, -0.1), velocity, None)
+    assert meets
+    # It flies at the place (0.05, 1, -0.4) of the edge.
+    assert time == pytest.approx(1.0 - radius / np.linalg.norm(velocity), abs=1e-14)
+
+
+def test_an_edge_is_found_where_a_corner_of_a_box_reaches_a_little_through_a_wall():
+    # The mouth is a triangle: three edges, each between two edges of the second box, in the wall z = 0.5 of the first.
+    cosine = 1.0 / math.sqrt(3.0)
+    sine = math.sqrt(0.25 - 0.25 * cosine)
+    for reach in (0.1, 0.01, 1e-3):
+        center = (0.03, 0.02, 0.5 + reach - 0.1 * math.sqrt(3.0))
+        corner = swarm.Box((0.1, 0.1, 0.1), center, rotation=(math.sqrt(0.5 + 0.5 * cosine), sine, -sine, 0.0))
+        walls = walls_of(swarm.Union([swarm.Box((0.5, 0.5, 0.5)), corner]), 0.01)
+        assert sum(len(wall.edges) for wall in walls) == 3
+
+
+def test_the_bend_of_an_edge_is_that_of_a_circle_or_at_the_end_of_the_long_axis_of_an_ellipse():
+    radius, wall = 0.2, 0.5
+    for axis in ((1.0, 0.0, 0.0), (1.0, 0.3, 0.0), (1.0, -1.0, 0.5)):
+        tube = swarm.Cylinder(radius, axis, 4.0)
+        (edge,) = walls_of(swarm.Union([swarm.Box((wall, 2.0, 2.0)), tube]), 0.05)[0].edges
+        least = radius / np.linalg.norm(axis)
+        assert 0.99 * least < edge.bend <= least
+    (edge,) = walls_of(swarm.Union([swarm.Box((wall, 2.0, 2.0)), swarm.Sphere(0.6, (0.15, 0.0, 0.0))]), 0.05)[0].edges
+    assert edge.bend == pytest.approx(math.sqrt(0.6**2 - 0.35**2), rel=2e-3)
+
+
+def test_a_flight_meets_the_mouth_of_a_tube_twice_as_wide_as_the_ball_at_once():
+    """Also slowly from the side."""
+    rooms = swarm.Union([swarm.Box((0.5, 0.5, 0.5), (x, 0.0, 0.0)) for x in (-1.0, 1.0)] + [
+        swarm.Cylinder(0.2, (1.0, 0.0, 0.0), 1.2)
+    ])  # fmt: skip
+    wall = next(wall for wall in walls_of(rooms, 0.1) if wall.edges)
+    place = np.array([0.2609590973064271, 0.08196657261335483, 0.03709515815024822])
+    velocity = np.array([0.8449662539444412, -0.31297022365714733, -0.433683835067775])
+    time, meets = wall.first_hit(Vec(*place), Vec(*velocity))
+    assert meets
+    x, y, z = place + time * velocity
+    assert math.hypot(x - 0.5, math.hypot(y, z) - 0.2) == pytest.approx(0.1, abs=1e-14)
+
+
 @pytest.mark.parametrize("height", [0.0, 0.02, 0.05, 0.069])
 def test_a_ball_meets_the_edge_of_a_doorway_at_a_distance_of_its_radius(height):
     # The lower edge of the doorway is the line x = 0.5, z = -0.2, which the ball comes to within the plane y = 0.1.

@@ -27,9 +27,12 @@ from .tip import TipPlane
 _SLACK, _FAR = 1e-11, 1e6
 # Where an edge only touches the wall of a third room, the place is known to the square root of the round-off.
 _TOUCHES = math.sqrt(_SLACK)
-# The number of places from which edges are searched, the most rooms, and the part of the smallest radius of curvature
-# at these places that is taken for a lower bound.
-_PLACES, _MOST, _ROUND = 24, 64, 0.5
+# Edges are searched from a place in each of so many parts, in each direction, of what is in the bounds of both rooms;
+# the most rooms.
+_PARTS, _MOST = 3, 64
+# Of the smallest radius of curvature that is found on an edge, this part is a lower bound. It is searched from so many
+# of the places on the edge, unless it is the same at all of them, down to this part of the way to the next place.
+_ROUND, _SHARPEST, _ALIKE, _SHORTEST = 0.999, 4, 1e-6, 1e-3
 # The most steps of Newton's method to a tip; one that is no longer than this round-off of a place is the last. Walls
 # with normals that span no more than this volume do not meet at a point.
 _SWEEPS, _STILL, _PARALLEL = 30, 4.0 * EPSILON, 1e-9
@@ -134,7 +137,7 @@ def _walls_of(joined: JoinedRooms) -> tuple[Any, ...]:
 def _made(joined: JoinedRooms) -> list[JoinedFaces]:
     rooms = tuple(tuple(wall for _surface, wall in _each(room)) for room in joined.rooms_of)
     extent = joined.extent()
-    slack, places, bounds = _SLACK * extent, _places_in(joined), [room_bounds(room) for room in joined.rooms_of]
+    slack, bounds = _SLACK * extent, [room_bounds(room) for room in joined.rooms_of]
     faces = [
         RoomFace(wall, (k, k), *_bend_of(one, wall))
         for k, room in enumerate(joined.rooms_of) for one, wall in _each(room)
@@ -143,10 +146,13 @@ def _made(joined: JoinedRooms) -> list[JoinedFaces]:
     group, edges = list(range(len(faces))), []
     tips: list[tuple[int, Vec]] = []
     for edge, (k, a), (m, b) in _edges_of(rooms):
+        places = _places_in((bounds[k], bounds[m]), extent, slack)
         on_it = [place for place in _crossings(edge, places) if _is_on((edge.one, edge.other), place, slack)]
-        ends = _tips_of(edge, on_it, rooms, bounds, slack, extent) if on_it else []
-        if ends or any(is_seen(rooms, edge.rooms, place, slack) for place in on_it):
-            edge = edge._replace(bend=_ROUND * min(map(edge.bend_at, on_it)))
+        starts = [x + way * along for x in on_it for along in [_along(edge, x)] for way in (0.0, extent, -extent)]
+        ends = list(_tips_of(edge, starts, rooms, bounds, slack))
+        seen = ends or any(is_seen(rooms, edge.rooms, place, slack) for place in on_it)
+        if seen or _turns(edge, starts, rooms, slack):
+            edge = edge._replace(bend=_bend_on(edge, on_it))
             one, other = group[first[k] + a], group[first[m] + b]
             group = [one if g == other else g for g in group]
             edges.append((first[k] + a, edge))
@@ -178,9 +184,15 @@ def _bend_of(surface: Surface, wall: Any) -> tuple[float | None, float]:
     return math.inf, 0.0
 
 
-def _places_in(joined: JoinedRooms) -> list[Vec]:
-    low, high = (np.clip(end, -joined.extent(), joined.extent()) for end in joined.bounds())
-    return [Vec(*place) for place in np.random.default_rng(0).uniform(low, high, (_PLACES, 3)).tolist()]
+def _places_in(bounds: tuple[Any, ...], extent: float, slack: float) -> list[Vec]:
+    """Places in all parts of what is in all of some boxes; none where that is empty."""
+    low = np.clip(np.max([box[0] for box in bounds], axis=0), -extent, extent)
+    high = np.clip(np.min([box[1] for box in bounds], axis=0), -extent, extent)
+    if (low > high + slack).any():
+        return []
+    parts = np.array(list(itertools.product(range(_PARTS), repeat=3)))
+    random = np.random.default_rng(0).uniform(size=parts.shape)
+    return [Vec(*place) for place in (low + (parts + random) / _PARTS * (high - low)).tolist()]
 
 
 def _edges_of(rooms: tuple[Any, ...]) -> Iterator[tuple[RoomEdge, tuple[int, int], tuple[int, int]]]:
@@ -202,34 +214,71 @@ def _is_on(walls: tuple[Any, ...], x: Vec, slack: float) -> bool:
 
 
 def _tips_of(
-    edge: RoomEdge, on_it: list[Vec], rooms: tuple[Any, ...], bounds: list[Any], slack: float, far: float
+    edge: RoomEdge, starts: list[Vec], rooms: tuple[Any, ...], bounds: list[Any], slack: float
 ) -> list[tuple[Vec, float]]:
     """The tips of an edge, where it is seen and goes into a third room: each a (place, uncertainty of the place [m]).
 
     Args:
         edge: an edge.
-        on_it: places where its walls cross.
+        starts: the places that tips are searched from.
         rooms: the walls of each room.
         bounds: a box around each room.
         slack: round-off of a place [m].
-        far: tips are searched from each of the places, and from so far along the edge on both sides [m].
     """
     found: list[tuple[Vec, float]] = []
-    starts = [x + way * along for x in on_it for along in [_along(edge, x)] for way in (0.0, far, -far)]
     for k, room in enumerate(rooms):
         boxes = [bounds[i] for i in (*edge.rooms, k)]
         low, high = np.max([box[0] for box in boxes], axis=0), np.min([box[1] for box in boxes], axis=0)
         if k in edge.rooms or (low > high + slack).any():
             continue
-        for wall in room:
-            walls = edge.one, edge.other, wall
+        for walls, x in _ends_at(edge, room, starts, slack):
+            if is_seen(rooms, (*edge.rooms, k), x, slack):
+                known = slack / max(_volume(walls, x), _TOUCHES)
+                if all(norm(x - y) > known for y, _known in found):
+                    found.append((Vec(*map(float, x)), known))
+    return found
+
+
+def _turns(edge: RoomEdge, starts: list[Vec], rooms: tuple[Any, ...], slack: float) -> bool:
+    """Whether an edge is seen where it ends at another wall of its own rooms.
+
+    What is seen of an edge is all of a closed curve, or it ends at a tip or there: it may be shorter than the way
+    between any two places that it is searched from.
+    """
+    ends = (x for k in edge.rooms for _walls, x in _ends_at(edge, rooms[k], starts, slack))
+    return any(is_seen(rooms, edge.rooms, x, slack) for x in ends)
+
+
+def _ends_at(edge: RoomEdge, room: Any, starts: list[Vec], slack: float) -> Iterator[tuple[tuple[Any, ...], Vec]]:
+    """Where an edge meets other walls of a room: (the three walls, the place), as often as it is found."""
+    for wall in room:
+        walls = edge.one, edge.other, wall
+        if wall is not edge.one and wall is not edge.other:
             for start in starts:
                 x = _meeting(walls, start)
-                if _is_on(walls, x, slack) and is_seen(rooms, (*edge.rooms, k), x, slack):
-                    known = slack / max(_volume(walls, x), _TOUCHES)
-                    if all(norm(x - y) > known for y, _known in found):
-                        found.append((Vec(*map(float, x)), known))
-    return found
+                if _is_on(walls, x, slack):
+                    yield walls, x
+
+
+def _bend_on(edge: RoomEdge, on_it: list[Vec]) -> float:
+    """A lower bound of the radius of curvature of an edge [m], by descent along the edge."""
+    bends = [edge.bend_at(x) for x in on_it]
+    order = np.argsort(bends)
+    least = bends[order[0]]
+    if not least < (1.0 - _ALIKE) * bends[order[-1]]:
+        return float(_ROUND * least)
+    for i in order[:_SHARPEST]:
+        x, bend, way = on_it[i], bends[i], 0.5 * bends[i]
+        shortest = _SHORTEST * way
+        while abs(way) > shortest:
+            to = crossing(edge.one, edge.other, x + way * _along(edge, x), math.inf)
+            after = edge.bend_at(to)
+            if after < bend:
+                x, bend = to, after
+            else:
+                way = -0.5 * way if way > 0.0 else -way
+        least = min(least, bend)
+    return float(_ROUND * least)
 
 
 def _volume(walls: tuple[Any, ...], x: Vec) -> float:
