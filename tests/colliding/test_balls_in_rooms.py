@@ -194,6 +194,15 @@ def test_the_bend_of_an_edge_is_that_of_a_circle_or_at_the_end_of_the_long_axis_
     assert edge.bend == pytest.approx(math.sqrt(0.6**2 - 0.35**2), rel=2e-3)
 
 
+def test_the_bend_of_an_edge_is_sharp_where_tubes_of_nearly_one_radius_cross():
+    # With x^2 = b^2 - z^2 and y^2 = a^2 - z^2 it is sharpest at y = 0, z = a.
+    a, b = 0.3, 0.301
+    tubes = swarm.Union([swarm.Cylinder(a, (1.0, 0.0, 0.0), 2.0), swarm.Cylinder(b, (0.0, 1.0, 0.0), 2.0)])
+    (edge,) = (edge for wall in walls_of(tubes, 0.02) for edge in wall.edges)
+    least = 1.0 / math.sqrt(1.0 / (b * b - a * a) + 1.0 / (a * a))
+    assert 0.99 * least < edge.bend <= least
+
+
 def test_a_flight_meets_the_mouth_of_a_tube_twice_as_wide_as_the_ball_at_once():
     """Also slowly from the side."""
     rooms = swarm.Union([swarm.Box((0.5, 0.5, 0.5), (x, 0.0, 0.0)) for x in (-1.0, 1.0)] + [
