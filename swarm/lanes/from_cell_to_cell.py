@@ -16,8 +16,7 @@ from ..kernel.record import Record
 from ..kernel.vector import column, put
 from ..surfaces.facets.facet_cells import BLOCK, blocks_of, flight_in, from_middle, passes
 from ..surfaces.facets.free_room import NormalCone, cone_of, room_of
-from ..surfaces.fields.members import member
-from ..surfaces.time_of_impact import flights
+from ..surfaces.facets.members import hit_of
 from .table import STRIDE, marked_lanes
 
 # The hit of a lane, in rows of `course`.
@@ -174,8 +173,7 @@ class UnderWayAtRest(UnderWay):
     def met(self, gravity, mesh, i, m):
         """As of `UnderWay`."""
         r, v = column(self.rows, START, i), column(self.rows, SPEED, i)
-        time, _hits = flights.hit(gravity, member(mesh, m), r, v)
-        return flights.Hit(time, float(m))
+        return hit_of(mesh, gravity, r, v, m)
 
 
 class Maybe(Record):

@@ -127,9 +127,12 @@ def _met(gravity, mesh, under, i, m):
         if not step.time < until - t:
             return Hit(math.inf, -1.0)
         # A step that is round-off of the time, too, leads to the hit.
-        if step.wall == 0.0 or (step.wall == _NEARER and not t + step.time > t):
-            return Hit(t + step.time, float(m))
-        t += max(step.time, _ON * room / seen.bounds(0.0).speed) if step.wall == _BEYOND else step.time
+        leads, beyond = step.wall == 0.0 or (step.wall == _NEARER and not t + step.time > t), step.wall == _BEYOND
+        if leads:
+            beyond = mesh.body.gives_way(index(m), _place(seen, step.time))
+            if not beyond:
+                return Hit(t + step.time, float(m))
+        t += max(step.time, _ON * room / seen.bounds(0.0).speed) if beyond else step.time
         seen = mesh.seen(flight, t)
     return Hit(t, -1.0)
 

@@ -1,5 +1,7 @@
 """Triangles as walls: the same impacts as a box, none out at edges, corners, needles and thin walls, laws, slides."""
 
+import itertools
+
 import numpy as np
 import pytest
 import trimesh
@@ -260,6 +262,35 @@ def test_what_touches_one_side_of_a_ledge_is_not_deep_behind_the_other():
     # What is behind the middle of a wall is as deep as it is.
     behind = swarm.Scene([room]).compiled().walls()
     assert penetration(behind, Vec(0.5, 0.5, -2e-9)) == pytest.approx(2e-9)
+
+
+@pytest.mark.parametrize("motion", [None, swarm.Rotation((1.0, 2.0, 3.0), 0.5, (0.3, 0.0, 0.0))])
+@pytest.mark.parametrize("gravity", [None, (0.1, -0.2, -0.4)])
+def test_a_flight_past_a_saddle_vertex_goes_on(motion, gravity):
+    """There two facets in one plane are walls from opposite sides, and each reaches beyond its edges by round-off."""
+    rooms = {(0, 0, 1), (0, 1, 1), (0, 1, 0), (1, 0, 1)}
+    faces = []
+    for cell, axis, step in itertools.product(rooms, range(3), (-1, 1)):
+        beside = list(cell)
+        beside[axis] += step
+        if tuple(beside) not in rooms:
+            corner, u, w = np.array(cell, float), *np.eye(3)[[(axis + 1) % 3, (axis + 2) % 3]]
+            corner[axis] += step > 0
+            ring = [corner, corner + u, corner + u + w, corner + w][::step]
+            faces += [[ring[0], ring[1], ring[2]], [ring[0], ring[2], ring[3]]]
+    corners, triangles = np.unique(np.array(faces).reshape(-1, 3) - 1.0, axis=0, return_inverse=True)
+    mesh = swarm.Mesh(corners, triangles.reshape(-1, 3), motion=motion)
+    rng = np.random.default_rng(1)
+    places = 4e-13 * rng.uniform(-1.0, 1.0, (3, 100))
+    places = places[:, mesh.phi(places) < 0.0]
+    ways = rng.standard_normal(places.shape)
+    scene = swarm.Scene([mesh], gravity)
+    start = swarm.Particles(places, ways)
+    result = swarm.simulate(scene, start, swarm.Impact(), until=1.0, compile="never", walltime=60.0)
+    assert places.shape[1] > 20
+    assert (mesh.phi(result.particles.position, 1.0) < 1e-12).all()
+    assert result.observables["energy_error"].max() < 1e-13
+    assert result.observables["impacts"][-1] < 20 * places.shape[1]
 
 
 def test_a_slide_down_a_faceted_hopper_ends_at_its_apex():

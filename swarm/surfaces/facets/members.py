@@ -79,6 +79,11 @@ class Facets(Members, Patched):
     def is_there(self, number, r, near):
         return self.wall(number).is_there(r, near)
 
+    def gives_way(self, m, r):
+        """Whether a flight that meets the plane of a facet at r goes on, beside one that is turned the other way."""
+        # Beyond an edge, by round-off: hardly a hit is there.
+        return member(self, m).is_beyond(r, -self.like.room.value) and _is_nearer_to_opposite(self, m, r)
+
     def whole(self, number):
         facet = self.wall(number)
         return PlaneNumbers(facet.normal, facet.offset)
@@ -116,6 +121,24 @@ def _on_plane_of(facets, number, r, near):
 
 
 @outlined
+def _is_nearer_to_opposite(facets, m, r):
+    """Whether a place on the plane of a facet is nearer to one on that plane of which the other side is admissible.
+
+    Two of these meet at a saddle vertex. Each reaches beyond its edges by the round-off of places, and where both do a
+    flight between them would have no end. There the one is met to which the place belongs, or is nearer.
+    """
+    one, (first, stop) = member(facets, m), entries_at(facets.grid, r)
+    room, within = facets.like.room.value, one.within(r)
+    for k in range(first, stop):
+        other = member(facets, index(facets.grid.entries[k]))
+        turn = cross(one.normal, other.normal)
+        is_opposite = dot(one.normal, other.normal) < 0.0 and square(turn) <= _PARALLEL * _PARALLEL
+        if is_opposite and abs(other.phi(r)) <= _ON * room and other.within(r) > within:
+            return True
+    return False
+
+
+@outlined
 def _first_hit(facets, gravity, r, v):
     """The first hit, from cell to cell, or how far the flight is surely free."""
     cells, t = facets.grid, 0.0
@@ -147,10 +170,18 @@ def hit_in(facets, gravity, flight, cell, here):
     for k in range(first, stop):
         if _passes(cells, number, index(k - first), here):
             m = cells.entries[k]
-            time, _hits = flights.hit(gravity, member(facets, index(m)), r, v)
-            if time < found.time:
-                found = flights.Hit(time, float(m))
+            hit = hit_of(facets, gravity, r, v, index(m))
+            if hit.time < found.time:
+                found = hit
     return found
+
+
+def hit_of(facets, gravity, r, v, m):
+    """When a flight meets a facet, as a `Hit`."""
+    time, _hits = flights.hit(gravity, member(facets, m), r, v)
+    if time < math.inf and facets.gives_way(m, r + displacement(gravity, v, time)):
+        time = math.inf
+    return flights.Hit(time, float(m))
 
 
 def _passes(cells, number, k, here):
