@@ -293,6 +293,19 @@ def test_a_flight_past_a_saddle_vertex_goes_on(motion, gravity):
     assert result.observables["impacts"][-1] < 20 * places.shape[1]
 
 
+def test_what_is_before_one_side_of_a_sharp_ridge_is_not_deep_behind_the_other():
+    """As near to the ridge as it is, it would be behind the other by less than a step may end there."""
+    corners = [(0, 0, -1), (0, 0, 1), (1, 0, 0), (1, 0.1, 0)]
+    blade = swarm.Mesh(corners, [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)], "outside")
+    along, away = np.meshgrid([1e-9, 1e-8, 5e-8], [1e-14, 1e-12, 1e-10])
+    walls = swarm.Scene([blade]).compiled().walls()
+    for x, y in zip(along.ravel(), away.ravel(), strict=True):
+        assert penetration(walls, Vec(x, -y, 0.0)) == 0.0
+        # Behind a side it is as deep as it is behind that one, and not behind the other.
+        within = min(y, 0.02 * x)
+        assert penetration(walls, Vec(x, within, 0.0)) == pytest.approx(within, rel=1e-3)
+
+
 def test_a_slide_down_a_faceted_hopper_ends_at_its_apex():
     n = 24
     angle = 2.0 * np.pi * np.arange(n) / n

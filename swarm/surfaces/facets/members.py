@@ -55,6 +55,9 @@ class Facets(Members, Patched):
     def is_in_another(self, number, r):
         return _is_behind_another(self, number, r)
 
+    def deepest_in_cell(self, r):
+        return _deepest(self, r)
+
     def loosened(self, reach):
         room = self.like.room.value + ROOM * reach
         return self._replace(like=self.like._replace(room=Shared(room)))
@@ -103,6 +106,22 @@ def _is_behind_another(facets, number, r):
         if float(m) != number and member(facets, index(m)).distance(r) > 0.0:
             return True
     return False
+
+
+@outlined
+def _deepest(facets, r):
+    """The largest distance behind any facet; where one that a point is before or behind is nearer, how far behind it.
+
+    At a sharp ridge what is before one of its facets is behind the other.
+    """
+    first, stop = entries_at(facets.grid, r)
+    most, near, depth_there = -math.inf, math.inf, 0.0
+    for k in range(first, stop):
+        facet = member(facets, index(facets.grid.entries[k]))
+        most, depth = max(most, facet.distance(r)), facet.phi(r)
+        if abs(depth) < near and not facet.is_beyond(r, -(facet.room.value + facet.corners.beyond)):
+            near, depth_there = abs(depth), depth
+    return most if most <= near else depth_there
 
 
 @outlined
