@@ -16,6 +16,10 @@ from .report import ROOT, Row, in_turn, show, tier, write
 DOWN = (0.0, 0.0, -1.0)
 # About 1e5 triangles, as the bars have it.
 _SPHERE, _VESSEL = 160, 40
+# About 100, 1000 and 1e5 triangles that move, which may take so many times as long as at rest.
+_MOVED, _SLOWER = (5, 16, _SPHERE), 3.0
+_TURN = swarm.Rotation((1.0, 2.0, 3.0), rate=1.3, center=(0.1, 0.0, -0.05))
+_SWING = swarm.Oscillation((0.02, 0.01, 0.03), frequency=1.0)
 _COLD = """
 import sys, time
 from bench.meshes import ball, first_call
@@ -86,18 +90,47 @@ def _bytes(mesh: Any) -> float:
 
 
 def nanoseconds(scene: swarm.Scene, start: swarm.Particles, until: float) -> Any:
-    """What measures the processor time of an impact, on one thread [ns]."""
+    """What measures the processor time of an impact or a collision, on one thread [ns]."""
 
     def measure() -> float:
-        seconds, impacts = [], 0.0
+        seconds, events = [], 0.0
         for span in (1e-3 * until, until):
             began = time.process_time()
             end = swarm.simulate(scene, start, swarm.Impact(), until=span, threads=1, compile=tier())
             seconds.append(time.process_time() - began)
-            impacts = float(end.observables["impacts"][-1])
-        return 1e9 * (seconds[1] - seconds[0]) / impacts
+            known = end.observables
+            events = sum(float(known[name][-1]) for name in ("impacts", "collisions") if name in known)
+        return 1e9 * (seconds[1] - seconds[0]) / events
 
     return measure
+
+
+def _path(until: float) -> swarm.Path:
+    """A path around a circle, a place in each of ten parts of a turn."""
+    times = np.linspace(0.0, until, 2 + round(until))
+    angle = 2.0 * np.pi * 0.1 * times
+    return swarm.Path(times, 0.03 * np.stack([np.sin(angle), 1.0 - np.cos(angle), np.sin(angle)], axis=1))
+
+
+def moving(quick: bool) -> list[Row]:
+    """An event of points and of balls in a mesh that moves, over one in the same mesh at rest, all in turn."""
+    rows = []
+    for count in _MOVED[:1] if quick else _MOVED:
+        made = ball(count)
+        for what, number, until, radius in (("points", 2000, 60.0, None), ("balls", 400, 40.0, 0.02)):
+            number, until = (2, 1.0) if quick else (number, until)
+            ways = {"at rest": None, "turning": _TURN, "swinging": _SWING, "on a path": _path(until)}
+            measures = {}
+            for way, motion in ways.items():
+                scene = swarm.Scene([swarm.Mesh(*made, motion=motion)])
+                start = swarm.fill(scene, number, speed=1.0, seed=1, radius=radius)
+                measures[way] = nanoseconds(scene, start, until)
+            figures = in_turn(measures, 1 if quick else 3)
+            rest = figures["at rest"][0]
+            for way in ways:
+                name, bar = f"{what} in {len(made[1])} triangles {way}, an event", f"{_SLOWER * rest:.3g}"
+                rows.append(Row(name, *figures[way], "ns", "" if way == "at rest" else bar, figures[way][0] / rest))
+    return rows
 
 
 def main(quick: bool) -> None:
@@ -130,6 +163,7 @@ def main(quick: bool) -> None:
             )
         seconds = float(done.stdout.split()[-1])
         rows.append(Row("first call", seconds, seconds, "s"))
+    rows += moving(quick)
     show(rows)
     if not quick:
         write(rows, "meshes")
