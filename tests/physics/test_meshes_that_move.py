@@ -336,7 +336,14 @@ def test_a_mesh_that_turns_and_comes_for_a_time():
 
 @pytest.mark.parametrize("others", [False, True])
 @pytest.mark.parametrize("gravity", [None, (0.0, 1.0, -2.0)])
-@pytest.mark.parametrize("motion", [TURNED, swarm.Rotation((0.3, 0.0, 1.0), 12.0), TURNED + SHAKEN], ids=str)
+@pytest.mark.parametrize(
+    "motion",
+    [
+        *(pytest.param(one, id=str(one)) for one in (TURNED, swarm.Rotation((0.3, 0.0, 1.0), 12.0), TURNED + SHAKEN)),
+        pytest.param(LED, id="led"),
+        pytest.param(TURNED + LED, id="turned and led"),
+    ],
+)
 def test_lanes_that_leap_through_cells_meet_what_safe_steps_one_by_one_meet(motion, gravity, others, monkeypatch):
     block = swarm.Mesh(0.05 * CUBE, TRIANGLES, "outside", motion=motion)
     walls = [cube(motion=motion), block, *([swarm.Sphere(0.4)] if others else [])]

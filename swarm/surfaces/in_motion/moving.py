@@ -174,9 +174,9 @@ def _are_equal(one: Any, other: Any) -> bool:
 
 
 def _may_leap(field: Field) -> bool:
-    """Whether lanes can leap through the cells of a field; of a spline each would look for its piece."""
+    """Whether lanes can leap through the cells of a field."""
     wall = field.members
-    return isinstance(wall, Moving) and wall.accelerates and wall.body.in_blocks and wall.drive.track is None
+    return isinstance(wall, Moving) and wall.accelerates and wall.body.in_blocks
 
 
 def _may_stride(walls: list[Any]) -> bool:
