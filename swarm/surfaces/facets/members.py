@@ -117,8 +117,11 @@ def _deepest(facets, r):
     first, stop = entries_at(facets.grid, r)
     most, near, depth_there = -math.inf, math.inf, 0.0
     for k in range(first, stop):
+        most = max(most, member(facets, index(facets.grid.entries[k])).distance(r))
+    # Before all of them, as most points are
+    for k in range(first, stop if most > 0.0 else first):
         facet = member(facets, index(facets.grid.entries[k]))
-        most, depth = max(most, facet.distance(r)), facet.phi(r)
+        depth = facet.phi(r)
         if abs(depth) < near and not facet.is_beyond(r, -(facet.room.value + facet.corners.beyond)):
             near, depth_there = abs(depth), depth
     return most if most <= near else depth_there
