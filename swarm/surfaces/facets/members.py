@@ -84,8 +84,7 @@ class Facets(Members, Patched):
 
     def gives_way(self, m, r):
         """Whether a flight that meets the plane of a facet at r goes on, beside one that is turned the other way."""
-        # Beyond an edge, by round-off: hardly a hit is there.
-        return member(self, m).is_beyond(r, -self.like.room.value) and _is_nearer_to_opposite(self, m, r)
+        return _is_nearer_to_opposite(self, m, r)
 
     def whole(self, number):
         facet = self.wall(number)
@@ -151,7 +150,8 @@ def _is_nearer_to_opposite(facets, m, r):
     """
     one, (first, stop) = member(facets, m), entries_at(facets.grid, r)
     room, within = facets.like.room.value, one.within(r)
-    for k in range(first, stop):
+    # Beyond an edge, by round-off: hardly a hit is there.
+    for k in range(first, stop if one.is_beyond(r, -room) else first):
         other = member(facets, index(facets.grid.entries[k]))
         turn = cross(one.normal, other.normal)
         is_opposite = dot(one.normal, other.normal) < 0.0 and square(turn) <= _PARALLEL * _PARALLEL
@@ -201,7 +201,9 @@ def hit_in(facets, gravity, flight, cell, here):
 def hit_of(facets, gravity, r, v, m):
     """When a flight meets a facet, as a `Hit`."""
     time, _hits = flights.hit(gravity, member(facets, m), r, v)
-    if time < math.inf and facets.gives_way(m, r + displacement(gravity, v, time)):
+    room = facets.like.room.value
+    # Flights from one of two facets to the other, which is turned the other way, take no time.
+    if time * time * square(v) <= room * room and facets.gives_way(m, r + displacement(gravity, v, time)):
         time = math.inf
     return flights.Hit(time, float(m))
 
