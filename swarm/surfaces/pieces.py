@@ -77,9 +77,9 @@ def pieces_of(surfaces: Sequence[Surface], period: Lengths | None, largest: floa
         SceneError: a surface does not go with the period, or an opening does not reach the wall that it opens.
     """
     if any(one.is_solid() for one in surfaces):
-        from .presence.flush import firm  # loaded where there are solids
+        from .presence.flush import extended  # loaded where there are solids
 
-        surfaces = firm(surfaces)
+        surfaces = extended(surfaces)
     named = [(one, f"surfaces[{i}]") for i, one in enumerate(surfaces)]
     images = _with_reach(tuple(
         (one,) if period is None else tuple(images_of(one, period, name, largest)) for one, name in named

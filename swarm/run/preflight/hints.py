@@ -241,7 +241,7 @@ def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
     bodies = list(itertools.islice(_bodies(scene), _COMPARED))
     if len(bodies) < 2:
         return
-    from ...surfaces.presence.flush import pairs_in_one_place, standing  # loaded where there are two walls
+    from ...surfaces.presence.flush import pairs_in_one_place, flush_faces  # loaded where there are two walls
 
     surfaces, size = [one for _name, one, _is_listed in bodies], scene.extent() or 1.0
 
@@ -250,7 +250,7 @@ def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
 
     # Only listed solids reach into what they stand on.
     listed = [k for k, (_name, _one, is_listed) in enumerate(bodies) if is_listed]
-    closed = {(listed[i], face) for i, face in standing([surfaces[k] for k in listed])} if of_points else set()
+    closed = {(listed[i], face) for i, face in flush_faces([surfaces[k] for k in listed])} if of_points else set()
     for pair in pairs_in_one_place(surfaces, size, matters):
         if not any(end in closed for end in zip(pair.surfaces, pair.faces, strict=True)):
             words = _ONLY_TOUCH if pair.are_back_to_back else _IN_ONE_PLACE

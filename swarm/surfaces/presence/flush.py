@@ -58,7 +58,7 @@ def pairs_in_one_place(
         known.setdefault(tuple(along), []).append((i, a))
 
 
-def standing(surfaces: Sequence[Surface]) -> dict[tuple[int, int], float]:
+def flush_faces(surfaces: Sequence[Surface]) -> dict[tuple[int, int], float]:
     """The faces of solids, (surface, face), that lie within other walls, and how far each is to be moved out [m]."""
     size = max((surface.extent() for surface in surfaces), default=0.0) or 1.0
     mates = dict[tuple[int, int], list[tuple[int, int]]]()
@@ -76,10 +76,10 @@ def standing(surfaces: Sequence[Surface]) -> dict[tuple[int, int], float]:
     return found
 
 
-def firm(surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
+def extended(surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
     """Surfaces of a scene, of which solids reach into the walls that they stand on."""
     made = list(surfaces)
-    for (i, a), by in standing(surfaces).items():
+    for (i, a), by in flush_faces(surfaces).items():
         longer = faces_of(made[i])[a].longer
         assert longer is not None
         made[i] = longer(-by)
