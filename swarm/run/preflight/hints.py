@@ -241,7 +241,7 @@ def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
     bodies = list(itertools.islice(_bodies(scene), _COMPARED))
     if len(bodies) < 2:
         return
-    from ...surfaces.presence.flush import pairs_in_one_place, flush_faces  # loaded where there are two walls
+    from ...surfaces.presence.flush import flush_faces, pairs_in_one_place  # loaded where there are two walls
 
     surfaces, size = [one for _name, one, _is_listed in bodies], scene.extent() or 1.0
 
