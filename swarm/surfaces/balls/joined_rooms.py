@@ -33,6 +33,8 @@ _PARTS, _MOST = 3, 64
 # Of the smallest radius of curvature that is found on an edge, this part is a lower bound. It is searched from so many
 # of the places on the edge, unless it is the same at all of them, down to this part of the way to the next place.
 _ROUND, _SHARPEST, _ALIKE, _SHORTEST = 0.999, 4, 1e-6, 1e-3
+# An edge is seen so far beside a place at least, in parts of the extent: more than the reach of joined faces.
+_BESIDE = 1e-6
 # The most steps of Newton's method to a tip; one that is no longer than this round-off of a place is the last. Walls
 # with normals that span no more than this volume do not meet at a point.
 _SWEEPS, _STILL, _PARALLEL = 30, 4.0 * EPSILON, 1e-9
@@ -150,8 +152,7 @@ def _made(joined: JoinedRooms) -> list[JoinedFaces]:
         on_it = [place for place in _crossings(edge, places) if _is_on((edge.one, edge.other), place, slack)]
         starts = [x + way * along for x in on_it for along in [_along(edge, x)] for way in (0.0, extent, -extent)]
         ends = list(_tips_of(edge, starts, rooms, bounds, slack))
-        seen = ends or any(is_seen(rooms, edge.rooms, place, slack) for place in on_it)
-        if seen or _turns(edge, starts, rooms, slack):
+        if ends or any(_is_seen_at(edge, rooms, place, slack) for place in on_it) or _turns(edge, starts, rooms, slack):
             edge = edge._replace(bend=_bend_on(edge, on_it))
             one, other = group[first[k] + a], group[first[m] + b]
             group = [one if g == other else g for g in group]
@@ -246,7 +247,20 @@ def _turns(edge: RoomEdge, starts: list[Vec], rooms: tuple[Any, ...], slack: flo
     between any two places that it is searched from.
     """
     ends = (x for k in edge.rooms for _walls, x in _ends_at(edge, rooms[k], starts, slack))
-    return any(is_seen(rooms, edge.rooms, x, slack) for x in ends)
+    return any(_is_seen_at(edge, rooms, x, slack) for x in ends)
+
+
+def _is_seen_at(edge: RoomEdge, rooms: tuple[Any, ...], x: Vec, slack: float) -> bool:
+    """Whether an edge is seen at a place, or at its end, and beside it.
+
+    Where rooms touch at a face, corners of both are one line. That is no edge: it is seen no farther than the reach by
+    which one of the rooms is larger.
+    """
+    if not is_seen(rooms, edge.rooms, x, slack):
+        return False
+    along, step = _along(edge, x), _BESIDE / _SLACK * slack
+    beside = (crossing(edge.one, edge.other, x + way * along, math.inf) for way in (step, -step))
+    return any(is_seen(rooms, edge.rooms, y, slack) for y in beside)
 
 
 def _ends_at(edge: RoomEdge, room: Any, starts: list[Vec], slack: float) -> Iterator[tuple[tuple[Any, ...], Vec]]:
