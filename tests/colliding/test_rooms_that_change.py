@@ -45,6 +45,18 @@ def test_rooms_that_touch_at_a_face_change_as_one_box(change, method):
         assert one.observables["escaped"][-1] == other.observables["escaped"][-1]
 
 
+@pytest.mark.parametrize("x", [0.2, 0.0])
+def test_a_grain_in_a_corner_of_rooms_that_touch_meets_both_walls(x):
+    """They were one wall, of which a grain met one face at a time, or its impulses did not converge."""
+    halves = swarm.Union([swarm.Box((0.35, 0.4, 0.45), (side, 0.0, 0.0)) for side in (-0.35, 0.35)])
+    grain = swarm.Particles([[x], [0.3], [0.35]], [[0.1], [1.0], [1.01]], radius=0.05)
+    one, other = (
+        ran(vessel, grain, swarm.Penalty(1e-3, 1e4), 0.3).particles for vessel in (halves, swarm.Box((0.7, 0.4, 0.45)))
+    )
+    for name in ("position", "velocity"):
+        assert getattr(one, name) == pytest.approx(getattr(other, name), abs=1e-9)
+
+
 BOXES = swarm.Box((0.5, 0.5, 0.5)), swarm.Box((0.6, 0.2, 0.25), (0.9, 0.1, 0.05))
 SPHERES = swarm.Sphere(0.5), swarm.Sphere(0.4, (0.6, 0.1, 0.0))
 PIPE = swarm.Sphere(0.5), swarm.Cylinder(0.2, length=2.0, axis=(1.0, 0.0, 0.0), center=(0.9, 0.0, 0.0))

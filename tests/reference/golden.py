@@ -42,7 +42,7 @@ they pass, not by series: 1e-15 at its end.
 Two cells of soft walls that swing, `Penalty` at a cylinder and `AugmentedLagrangian` in an intersection, were written
 again when free steps were jumped over at once: 9e-15 and 1e-11 at their ends, as loops there do not converge.
 Two cells of balls in a union were written again when flights took longer steps and no bisection of round-off: 4e-16 at
-their ends.
+their ends; and again when corners that two rooms have in common were no edges any more.
 
 The runs "cell: ..." are those of cells of `bench.cells` that work, one kind of wall for each engine and capability, and
 their digests are of the final state, the observables and the datasets of the trajectory, but for dates, versions,

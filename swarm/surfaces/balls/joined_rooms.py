@@ -33,7 +33,7 @@ _PARTS, _MOST = 3, 64
 # Of the smallest radius of curvature that is found on an edge, this part is a lower bound. It is searched from so many
 # of the places on the edge, unless it is the same at all of them, down to this part of the way to the next place.
 _ROUND, _SHARPEST, _ALIKE, _SHORTEST = 0.999, 4, 1e-6, 1e-3
-# An edge is seen so far beside a place at least, in parts of the extent: more than the reach of joined faces.
+# An edge is seen so far beside a place at least, in parts of the extent.
 _BESIDE = 1e-6
 # The most steps of Newton's method to a tip; one that is no longer than this round-off of a place is the last. Walls
 # with normals that span no more than this volume do not meet at a point.
@@ -251,16 +251,18 @@ def _turns(edge: RoomEdge, starts: list[Vec], rooms: tuple[Any, ...], slack: flo
 
 
 def _is_seen_at(edge: RoomEdge, rooms: tuple[Any, ...], x: Vec, slack: float) -> bool:
-    """Whether an edge is seen at a place, or at its end, and beside it.
+    """Whether an edge is seen at a place, or at its end, and beside it within all other walls of its own rooms.
 
-    Where rooms touch at a face, corners of both are one line. That is no edge: it is seen no farther than the reach by
-    which one of the rooms is larger.
+    Corners that two rooms have in common are no edge: balls turn about what only two walls end at.
     """
     if not is_seen(rooms, edge.rooms, x, slack):
         return False
+    others = [wall for k in edge.rooms for wall in rooms[k] if wall is not edge.one and wall is not edge.other]
     along, step = _along(edge, x), _BESIDE / _SLACK * slack
     beside = (crossing(edge.one, edge.other, x + way * along, math.inf) for way in (step, -step))
-    return any(is_seen(rooms, edge.rooms, y, slack) for y in beside)
+    return any(
+        is_seen(rooms, edge.rooms, y, slack) and all(wall.distance(y) < -slack for wall in others) for y in beside
+    )
 
 
 def _ends_at(edge: RoomEdge, room: Any, starts: list[Vec], slack: float) -> Iterator[tuple[tuple[Any, ...], Vec]]:
