@@ -33,8 +33,8 @@ _PARTS, _MOST = 3, 64
 # Of the smallest radius of curvature that is found on an edge, this part is a lower bound. It is searched from so many
 # of the places on the edge, unless it is the same at all of them, down to this part of the way to the next place.
 _ROUND, _SHARPEST, _ALIKE, _SHORTEST = 0.999, 4, 1e-6, 1e-3
-# An edge is seen so far beside a place at least, in parts of the extent.
-_BESIDE = 1e-6
+# An edge is also seen beside a place, at this many round-offs of a place from it.
+_BESIDE = 1e5
 # The most steps of Newton's method to a tip; one that is no longer than this round-off of a place is the last. Walls
 # with normals that span no more than this volume do not meet at a point.
 _SWEEPS, _STILL, _PARALLEL = 30, 4.0 * EPSILON, 1e-9
@@ -186,7 +186,7 @@ def _bend_of(surface: Surface, wall: Any) -> tuple[float | None, float]:
 
 
 def _places_in(bounds: tuple[Any, ...], extent: float, slack: float) -> list[Vec]:
-    """Places in all parts of what is in all of some boxes; none where that is empty."""
+    """Places in all parts of the intersection of some boxes; an empty list if that is empty."""
     low = np.clip(np.max([box[0] for box in bounds], axis=0), -extent, extent)
     high = np.clip(np.min([box[1] for box in bounds], axis=0), -extent, extent)
     if (low > high + slack).any():
@@ -258,7 +258,7 @@ def _is_seen_at(edge: RoomEdge, rooms: tuple[Any, ...], x: Vec, slack: float) ->
     if not is_seen(rooms, edge.rooms, x, slack):
         return False
     others = [wall for k in edge.rooms for wall in rooms[k] if wall is not edge.one and wall is not edge.other]
-    along, step = _along(edge, x), _BESIDE / _SLACK * slack
+    along, step = _along(edge, x), _BESIDE * slack
     beside = (crossing(edge.one, edge.other, x + way * along, math.inf) for way in (step, -step))
     return any(
         is_seen(rooms, edge.rooms, y, slack) and all(wall.distance(y) < -slack for wall in others) for y in beside
