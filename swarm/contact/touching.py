@@ -116,7 +116,8 @@ def _slide(method, walls, gravity, wall, flight, energy, impulse, lane):
     w = accelerated(gravity, 2.0 * u - accelerated(gravity, v, 0.5 * h), 0.5 * h)
     u = from_relative(frame, u)
     if moves(u):
-        r = _settled(carried.at(flight.remaining - h), wall, touch, r + h * u, method.touch)
+        end = _end_of_step(carried, moving, wall, r, u, (flight.remaining, flight.remaining - h))
+        r = _settled(carried.at(flight.remaining - h), wall, touch, end, method.touch)
     w = from_relative(frame, w)
     if moving is not None:
         # Walls do work.
@@ -186,6 +187,21 @@ def _unhindered(walls, gravity, touch, r, v, h, near):
             # The step to that wall is another one, since its walls curve and gravity has less time.
             h = following if cut < _CUTS // 2 else 0.5 * following
     return u, h
+
+
+@outlined
+def _end_of_step(walls, moving, wall, r, u, during):
+    """The end of a step from r with the velocity u, straight in the frame of the wall.
+
+    Straight in the scene, the step would leave a corner that turns by half its acceleration times h^2, which is beyond
+    the edges of all facets there.
+    """
+    remaining, after = during
+    h = remaining - after
+    if moving is None:
+        return r + h * u
+    over = walls.during(remaining, after)
+    return over.carry(wall, r + h * (u - walls.at(remaining).velocity(wall, r)))
 
 
 @outlined
