@@ -79,7 +79,31 @@ COLUMN = swarm.Cylinder(0.1, length=0.4, center=(0.5, 0.0, 0.2), side="outside")
 LOW_ROOM = swarm.Box((1.0, 1.0, 0.5), center=(0.0, 0.0, 0.5))
 BRICK = swarm.Box((0.5, 0.5, 0.5), side="outside")
 TURN = {"axis": (0.0, 1.0, 0.0), "angle": 0.5}
+SQUARE = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+PIT = swarm.Prism(SQUARE, 1.0, center=(0.0, 0.0, 0.5))
+
+
+def mesh_of(box, **given):
+    """A box as twelve triangles."""
+    corners = np.array(list(np.ndindex(2, 2, 2))) * 2.0 - 1.0
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = [(a, *two) for a, b, c, d in sides for two in ((b, c), (c, d))]
+    return swarm.Mesh(corners * box.half_widths, triangles, center=box.center, side=box.side, **given)
+
+
 IN_ONE_PLACE = {
+    "a column at a wall": (
+        [swarm.Polygon(SQUARE, side="outside"), swarm.Plane((1.0, 0.0, 0.0), 1.0)],
+        "touch at a face",
+    ),
+    "a mesh over an edge": (
+        [BRICK, mesh_of(swarm.Box((0.1, 0.1, 0.1), center=(0.5, 0, 0.6), side="outside"))],
+        "touch at a face",
+    ),
+    "a prism with a lid that absorbs": (
+        [PIT, swarm.Plane((0.0, 0.0, 1.0), 1.0, laws=[swarm.Absorb(1.0)])],
+        "the laws of either",
+    ),
     "a face that absorbs": ([HALL, swarm.Plane(**LID, laws=[swarm.Absorb(1.0)])], "the laws of either"),
     "a face with losses": ([swarm.Plane(**LID, restitution=0.5), HALL], "the laws of either"),
     "a warm face": ([HALL, swarm.Plane(**LID, temperature=1.0)], "the laws of either"),
@@ -107,6 +131,12 @@ NOT_IN_ONE_PLACE = {
     "a post in a corner": [LOW_ROOM, swarm.Box((0.1, 0.1, 0.2), center=(0.9, 0.9, 0.2), side="outside")],
     "a beam from wall to wall": [LOW_ROOM, swarm.Box((0.1, 1.0, 0.2), center=(0.0, 0.0, 0.5), side="outside")],
     "a column": [FLOOR, COLUMN],
+    "a mesh on a plane": [FLOOR, mesh_of(POST)],
+    "a turned mesh": [FLOOR, mesh_of(POST, rotation={"axis": (0.0, 0.0, 1.0), "angle": 0.5})],
+    "a post in a prism": [PIT, POST],
+    "a post in a mesh": [mesh_of(LOW_ROOM), POST],
+    "a mesh in a corner of a prism": [PIT, mesh_of(swarm.Box((0.1, 0.1, 0.2), (0.9, 0.9, 0.2), side="outside"))],
+    "a mesh above its floor": [FLOOR, mesh_of(swarm.Box((0.1, 0.1, 0.1), center=(0.5, 0, 0.2), side="outside"))],
     "a post that overlaps its floor": [FLOOR, swarm.Box((0.1, 0.1, 0.2), center=(0.5, 0.0, 0.1), side="outside")],
     "a post above its floor": [FLOOR, swarm.Box((0.1, 0.1, 0.1), center=(0.5, 0.0, 0.2), side="outside")],
     "bricks in one layer, apart": [BRICK, swarm.Box((0.5, 0.5, 0.5), center=(1.0, 1.5, 0.0), side="outside")],
@@ -150,16 +180,19 @@ def sunk(post, by):
     return swarm.Cylinder(post.radius, length=post.length + by, center=(x, y, z - 0.5 * by), side="outside")
 
 
+def slid_against(room, post, gravity, radius):
+    # The first meets the post, the second one passes beside it.
+    low = 0.0 if radius is None else radius
+    position = np.array([[0.25, 0.25], [0.01, 0.4], [low, low]])
+    velocity = np.array([[1.0, 1.0], [0.0, 0.0], [0.0, 0.0]])
+    particles = swarm.Particles(position, velocity, radius=radius)
+    return run(swarm.Scene([room, post], gravity=gravity), particles, until=0.8, frames=2)
+
+
 @pytest.mark.parametrize("post", [POST, COLUMN, swarm.Box((0.1,) * 3, center=(0.9, 0.0, 0.1), side="outside")])
 @pytest.mark.parametrize(("gravity", "radius"), [(None, None), ((0.0, 0.0, -9.81), None), (None, 0.05)])
 def test_what_slides_on_a_floor_meets_a_post_that_stands_on_it(post, gravity, radius):
-    # The first meets the post, the second one passes beside it.
-    low, ends = 0.0 if radius is None else radius, []
-    position = np.array([[0.25, 0.25], [0.01, 0.4], [low, low]])
-    velocity = np.array([[1.0, 1.0], [0.0, 0.0], [0.0, 0.0]])
-    for foot in (post, sunk(post, 0.01)):
-        scene = swarm.Scene([LOW_ROOM, foot], gravity=gravity)
-        ends.append(run(scene, swarm.Particles(position, velocity, radius=radius), until=0.8, frames=2))
+    ends = [slid_against(LOW_ROOM, foot, gravity, radius) for foot in (post, sunk(post, 0.01))]
     for one in ends:
         assert one.particles.position[0, 0] < 0.8
         assert one.impacts_per_particle[0] >= 1
@@ -167,3 +200,11 @@ def test_what_slides_on_a_floor_meets_a_post_that_stands_on_it(post, gravity, ra
         energy = one.observables["total_energy"]
         assert np.abs(energy / energy[0] - 1.0).max() < 1e-12
     np.testing.assert_allclose(ends[0].particles.position, ends[1].particles.position, atol=1e-12)
+
+
+@pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -9.81)])
+@pytest.mark.parametrize(("room", "post"), [(PIT, POST), (LOW_ROOM, mesh_of(POST)), (mesh_of(LOW_ROOM), POST)])
+def test_posts_stand_flush_on_prisms_and_meshes_too(room, post, gravity):
+    one, other = slid_against(room, post, gravity, None), slid_against(LOW_ROOM, sunk(POST, 0.01), gravity, None)
+    assert one.particles.velocity[0, 0] < 0.0
+    np.testing.assert_allclose(one.particles.position, other.particles.position, atol=1e-12)

@@ -202,6 +202,18 @@ class Surface(Validated):
         """Half-spaces n.r <= offset around the admissible side that are tighter than `bounds`."""
         return []
 
+    def flat_faces(self) -> NDArray[np.float64]:
+        """Of an outline or a mesh the planes of flat faces: rows of unit normals along which phi grows, and offsets."""
+        return np.empty((0, 4))
+
+    def with_flat_face_out(self, number: int, by: float) -> "Surface | None":
+        """The surface with one of `flat_faces` so far along its normal [m]; None: it cannot be moved."""
+        return None
+
+    def places_of_flat_face(self, number: int, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Points on one of `flat_faces`, and on its edges, (3, count) each; None: they are not known."""
+        return None
+
     def open_faces(self) -> list[HalfSpace]:
         """The faces (n, offset) at which the surface ends without a wall; n.r > offset is beyond one."""
         return []

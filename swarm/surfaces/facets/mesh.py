@@ -28,6 +28,7 @@ from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .faces import faces_of
 from .facet import OVERLAP, ROOM, THIN, CornersOf, CornersOfSides, FacetNumbers, Shared, SheetSide
 from .facet_cells import MOVING_MARGIN, cells_around
+from .flat import in_plane, places_of, planes_of, rim_of
 from .made import given_arrays, sorted_by_place, table_of_facets, table_of_sides, triangles_of_balls, with_room
 from .members import Facets
 from .mending import sizes
@@ -264,6 +265,29 @@ class Mesh(Surface):
             (replace(self, groups=None, **given.get(name, {})), count)
             for name, count in zip(self.names, counts.tolist(), strict=True) if count
         ]  # fmt: skip
+
+    @cached_property
+    def _planes(self) -> Floats:
+        return planes_of(self.corners, np.asarray(self.triangles))
+
+    def flat_faces(self) -> Floats:
+        # Points on both sides of a sheet are beside a wall that has no inside.
+        return super().flat_faces() if self.open else self._planes
+
+    def places_of_flat_face(self, number: int, count: int) -> tuple[Floats, Floats]:
+        mesh, plane = (self.corners, np.asarray(self.triangles)), self._planes[number]
+        return places_of(*mesh, plane, count), rim_of(*mesh, plane, count)
+
+    def with_flat_face_out(self, number: int, by: float) -> "Mesh":
+        plane, planes = self._planes[number], self._planes.copy()
+        own = plane[:3] if self.rotation is None else plane[:3] @ rotations.matrix(self.rotation)
+        vertices = np.where(in_plane(self.corners, plane)[:, None], self.vertices + by * own, self.vertices)
+        vertices.flags.writeable = False
+        # Nothing is to be mended, and triangles and faces keep their numbers.
+        made = replace(self, vertices=vertices, _made=self._made._replace(given=(vertices, *self._made.given[1:])))
+        planes[number, 3] += by
+        made.__dict__["_planes"] = planes
+        return made
 
     # --- For users ---------------------------------------------------------------------------------------
 

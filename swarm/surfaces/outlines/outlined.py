@@ -170,6 +170,15 @@ class Outlined(Many):
                 found.append((tuple(n.tolist()), float(offset + n @ np.array(self.center))))
         return found  # type: ignore[return-value]
 
+    def flat_faces(self) -> Floats:
+        flat = self.boundary.sides.curvature == 0.0
+        own = self.boundary.sides.normal[flat], self.boundary.sides.start[flat]
+        normals, starts = (rows @ self.frame[:, :2].T for rows in own)
+        if self.height is not None:
+            lids = np.array([[1.0], [-1.0]]) * self.frame[:, 2]
+            normals, starts = np.vstack([normals, lids]), np.vstack([starts, 0.5 * self.height * lids])
+        return np.column_stack([normals, (normals * (starts + np.array(self.center))).sum(axis=1)])
+
     def extent(self) -> float:
         return float(
             max(map(abs, self.center)) + math.hypot(2.0**0.5 * self.boundary.extent, 0.5 * (self.height or 0.0))

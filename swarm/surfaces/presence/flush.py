@@ -12,12 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...state import Floats
+from ..facets.flat import DIGITS, keys_of
 from ..instant import are_there_together, distances, side_of
 from ..surface import Surface
 from .seams import ENOUGH, FAR, OUTSIDE, PLACES, Face, faces_of
 
-# Digits to which two flat faces are in one place, of a normal and of an offset in sizes of the scene.
-_DIGITS = 9
 # Of the size: the reach, which is more than those digits, and than what counts as touching a wall.
 _REACH = 2e-9
 
@@ -40,22 +39,49 @@ def pairs_in_one_place(
         size: their size [m].
         matters: whether two surfaces are asked for; and whether back to back.
     """
-    ends, planes = list[tuple[int, int, Face]](), list[Floats]()
-    for i, one in enumerate(surfaces):
-        for a, face in enumerate(faces_of(one)):
-            if face.plane is not None:
-                ends.append((i, a, face))
-                planes.append(np.array([*face.plane[0], face.plane[1] / size]))
-    rows = np.array(planes).reshape(-1, 4)
-    places = zip(*((np.round(sign * rows, _DIGITS) + 0.0).tolist() for sign in (1.0, -1.0)), strict=True)
-    known = dict[tuple[float, ...], list[tuple[int, int]]]()
-    for (i, a, face), (along, against) in zip(ends, places, strict=True):
-        for place, are_back_to_back in ((along, False), (against, True)):
-            for j, b in known.get(tuple(place), []):
+    each = [_planes(one) for one in surfaces]
+    owners = np.repeat(np.arange(len(each)), [len(planes) for planes in each])
+    numbers = np.concatenate([np.arange(len(planes)) for planes in each])
+    keys = keys_of(np.concatenate(each), size)
+    # A mesh has many planes, few of which are those of another surface.
+    _keys, which, counts = np.unique(np.abs(keys), return_inverse=True, return_counts=True)
+    same, known = (counts > 1)[which], dict[float, list[tuple[int, int]]]()
+    for i, a, key in zip(owners[same].tolist(), numbers[same].tolist(), keys[same].tolist(), strict=True):
+        for place, are_back_to_back in ((key, False), (-key, True)):
+            for j, b in known.get(place, []):
                 one, other = surfaces[j], surfaces[i]
-                if matters(one, other, are_back_to_back) and _share_a_place(one, other, face, size):
+                if i == j or not matters(one, other, are_back_to_back):
+                    continue
+                if _share_a_place((one, b), (other, a), size):
                     yield Pair((j, i), (b, a), are_back_to_back)
-        known.setdefault(tuple(along), []).append((i, a))
+        known.setdefault(key, []).append((i, a))
+
+
+def _planes(surface: Surface) -> Floats:
+    """The planes of its flat faces, as rows of unit normals out of its admissible side, and offsets (n, 4) [m].
+
+    Of a face that is not flat they are not a number.
+    """
+    if len(flat := surface.flat_faces()):
+        return side_of(surface) * flat
+    rows = [np.full(4, np.nan) if face.plane is None else np.append(*face.plane) for face in faces_of(surface)]
+    return np.array(rows).reshape(-1, 4)
+
+
+def face_of(surface: Surface, number: int) -> Face:
+    """A face by its number among the planes of a surface."""
+    if not len(flat := surface.flat_faces()):
+        return faces_of(surface)[number]
+    side = side_of(surface)
+
+    def longer(by: float) -> Surface:
+        made = surface.with_flat_face_out(number, side * by)
+        assert made is not None
+        return made
+
+    can_be_moved = surface.with_flat_face_out(number, 0.0) is not None
+    plane = side * flat[number, :3], float(side * flat[number, 3])
+    return Face(surface, plane, longer if can_be_moved else None)
 
 
 def flush_faces(surfaces: Sequence[Surface]) -> dict[tuple[int, int], float]:
@@ -69,9 +95,9 @@ def flush_faces(surfaces: Sequence[Surface]) -> dict[tuple[int, int], float]:
                 mates.setdefault(end, []).append(mate)
     found = {}
     for (i, a), others in mates.items():
-        face = faces_of(surfaces[i])[a]
-        if face.longer is not None and _is_within(surfaces[i], face, [surfaces[j] for j, _b in others], size):
-            apart = [_apart(face, faces_of(surfaces[j])[b]) for j, b in others]
+        face = face_of(surfaces[i], a)
+        if face.longer is not None and _is_within(surfaces[i], a, [surfaces[j] for j, _b in others], size):
+            apart = [_apart(face, face_of(surfaces[j], b)) for j, b in others]
             found[i, a] = max(apart) + _REACH * size
     return found
 
@@ -80,7 +106,7 @@ def extended(surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
     """Surfaces of a scene, of which solids reach into the walls that they stand on."""
     made = list(surfaces)
     for (i, a), by in flush_faces(surfaces).items():
-        longer = faces_of(made[i])[a].longer
+        longer = face_of(made[i], a).longer
         assert longer is not None
         made[i] = longer(-by)
     return tuple(made)
@@ -103,28 +129,31 @@ def _apart(face: Face, mate: Face) -> float:
     return -(face.plane[1] + mate.plane[1])
 
 
-def _is_within(solid: Surface, face: Face, others: Sequence[Surface], size: float) -> bool:
-    """Whether what a solid gains where a face of it is moved out is deep in what others keep from particles.
+def _is_within(solid: Surface, number: int, others: Sequence[Surface], size: float) -> bool:
+    """Whether what a solid gains where one of its faces is moved out is deep in what others keep from particles.
 
     At the rim of the face a wall of another one must not go on from one of the solid: round-off would lead points that
     slide on both against the side of what is gained.
     """
-    assert face.longer is not None
+    random, most = np.random.default_rng(1), FAR * size
     solid, others = solid.at_rest(), [one.at_rest() for one in others]
-    larger, most = face.longer(-FAR * size).at_rest(), FAR * size
-    low, high = (np.clip(corner, -size, size)[:, None] for corner in _filled(solid).bounds())
-    random = np.random.default_rng(1)
-    flat = face.onto(low + (high - low) * random.random((3, PLACES)))
-    gained = flat - most * random.random(PLACES) * face.normals(flat)
-    gained = gained[:, side_of(larger) * larger.phi(gained) >= 0.0]
+    face, (flat, rim) = face_of(solid, number), _places_of(solid, number, size, random)
+    flat = flat[:, np.abs(solid.phi(flat)) <= 10.0**-DIGITS * size]
+    gained = flat - most * random.random(flat.shape[1]) * face.normals(flat)
     if gained.shape[1] < ENOUGH or not (_depths(others, gained) >= -OUTSIDE * size).all():
         return False
-    for side in faces_of(solid):
-        rim = face.onto(side.onto(flat))
-        rim = rim[:, np.abs(solid.phi(rim)) <= 10.0**-_DIGITS * size]
-        if not (_depths(others, rim - most * face.normals(rim)) >= 0.5 * most).all():
-            return False
-    return True
+    return bool((_depths(others, rim - most * face.normals(rim)) >= 0.5 * most).all())
+
+
+def _places_of(solid: Surface, number: int, size: float, random: np.random.Generator) -> tuple[Floats, Floats]:
+    """Points (3, N) in the plane of a face of a solid, among which are some on the face, and points on its rim."""
+    if (known := solid.places_of_flat_face(number, PLACES)) is not None:
+        return known
+    low, high = (np.clip(corner, -size, size)[:, None] for corner in _filled(solid).bounds())
+    face = face_of(solid, number)
+    flat = face.onto(low + (high - low) * random.random((3, PLACES)))
+    rim = np.concatenate([face.onto(side.onto(flat)) for side in faces_of(solid)], axis=1)
+    return flat, rim[:, np.abs(solid.phi(rim)) <= 10.0**-DIGITS * size]
 
 
 def _depths(walls: Sequence[Surface], points: Floats) -> Floats:
@@ -133,19 +162,24 @@ def _depths(walls: Sequence[Surface], points: Floats) -> Floats:
         return np.asarray(np.max([side_of(one) * distances(one, points) for one in walls], axis=0))
 
 
-def _share_a_place(one: Surface, other: Surface, face: Face, size: float) -> bool:
+def _share_a_place(first: tuple[Surface, int], second: tuple[Surface, int], size: float) -> bool:
     """Whether two surfaces that move as one have a place in common, on their flat faces in one plane."""
+    one, other = first[0], second[0]
     if one.motion != other.motion or not are_there_together(one, other):
         return False
     boxes = np.array([_filled(surface).bounds() for surface in (one, other)])
     reach = size + float(np.abs(boxes[np.isfinite(boxes)]).max(initial=0.0))
     least, most = np.clip([boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)], -reach, reach)
-    if (least > most + 10.0 ** (1 - _DIGITS) * size).any():
+    if (least > most + 10.0 ** (1 - DIGITS) * size).any():
         return False
-    points = face.onto(least[:, None] + (most - least)[:, None] * np.random.default_rng(0).random((3, PLACES)))
+    random = np.random.default_rng(0).random((3, PLACES))
+    tried = [face_of(*second).onto(least[:, None] + (most - least)[:, None] * random)]
+    # Feet of a table are small in the box around it.
+    tried += [known[0] for end, a in (first, second) if (known := end.places_of_flat_face(a, PLACES)) is not None]
+    points = np.concatenate(tried, axis=1)
     with np.errstate(all="ignore"):
         off = [np.abs(surface.at_rest().phi(points)) for surface in (one, other)]
-    return bool((np.maximum(*off) <= 10.0**-_DIGITS * size).any())
+    return bool((np.maximum(*off) <= 10.0**-DIGITS * size).any())
 
 
 def _filled(surface: Surface) -> Surface:
