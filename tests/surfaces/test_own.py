@@ -295,6 +295,21 @@ def test_a_curvature_that_is_true_is_never_refused(k, scale, offset):
         swarm.OwnSurface(numbers, waves, gradient_of_waves, size=size, bounds=box, curvature=k * k * scale)
 
 
+def wrong_gradient_of_waves(p, x, y, z):
+    a, b, c = gradient_of_waves(p, x, y, z)
+    return 1.001 * a, 1.001 * b, 1.001 * c
+
+
+@pytest.mark.parametrize(("k", "offset"), [(1e4, 0.0), (1e6, 0.0), (1.0, 1e6), (10.0, 1e6)])
+def test_a_gradient_of_fine_or_far_waves_is_refused_only_where_it_is_wrong(k, offset):
+    """Its differences are over 6e-6 m and less of 1 m, and over 6 m and less where places are 1e6 m from the origin."""
+    box, numbers = ((offset - 1.0, -1.0, -0.7), (offset + 1.0, 1.0, 0.7)), Waves(k, 1.0, offset)
+    given = {"size": 0.5, "bounds": box, "curvature": 2.0 * k * k}
+    swarm.OwnSurface(numbers, waves, gradient_of_waves, **given)
+    with pytest.raises(swarm.SceneError, match="gradient must be the gradient of phi"):
+        swarm.OwnSurface(numbers, waves, wrong_gradient_of_waves, **given)
+
+
 @pytest.mark.parametrize(
     ("curvature", "words"),
     [(None, "or give `curvature`, or closer `bounds`, by which"), (23.0, "or a smaller `curvature` where that is")],

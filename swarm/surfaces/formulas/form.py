@@ -39,6 +39,8 @@ _ONTO, _MOVES = 256, 60
 # A gradient up to this length, relative to |phi|/size in the bounds, counts as 0. A gradient that differs from
 # differences of phi by more than this is wrong.
 _FLAT, _WRONG = 1e-8, 1e-4
+# Steps of these differences; it must differ in all of them.
+_STEPS = 6
 
 _STRAIGHT = Bend.of_magnitude(0.0)
 
@@ -241,12 +243,16 @@ class Form:
     def check_gradient(self) -> None:
         """Raise if the gradient is not that of phi."""
         points = self.points(_ONTO)
-        step = _DIFFERENCE * self.reach()
-        ends = points[:, :, None, None] + step * np.eye(3)[:, None, :, None] * np.array([1.0, -1.0])
-        values = self.value(ends.reshape(3, -1)).reshape(_ONTO, 3, 2)
-        measured, given = (values[:, :, 0] - values[:, :, 1]).T / (2.0 * step), self.slope(points)
-        scale = np.abs(given).max(axis=0) + np.abs(values).max(axis=(1, 2)) / self.reach()
-        off = np.abs(measured - given).max(axis=0) > _WRONG * scale
+        given = self.slope(points)
+        agrees, differs = np.zeros((2, _ONTO), np.bool_)
+        # phi may bend within a length much shorter than its reach, up to where the round-off of a place is seen.
+        for step in np.geomspace(_DIFFERENCE, _ROUND_OFF * EPSILON / _WRONG, _STEPS) * self.reach():
+            measured, values = self._differences(points, step)
+            scale = np.abs(given).max(axis=0) + np.abs(values).max(axis=(1, 2)) / self.reach()
+            apart = np.abs(measured - given).max(axis=0)
+            agrees |= apart <= _WRONG * scale
+            differs |= apart > _WRONG * scale
+        off = differs & ~agrees
         # At a few points phi itself may have a kink.
         if np.count_nonzero(off) > 0.1 * _ONTO:
             i = int(np.argmax(off))
@@ -254,6 +260,14 @@ class Form:
                 f"gradient must be the gradient of phi, got {shown(given[:, i])} at {shown(points[:, i])}, where "
                 f"differences of phi give {shown(measured[:, i])}"
             )
+
+    def _differences(self, points: Floats, step: float) -> tuple[Floats, Floats]:
+        """The gradient by central differences of phi (3, N), and phi at their ends (N, 3, 2)."""
+        ends = points[:, :, None, None] + step * np.eye(3)[:, None, :, None] * np.array([1.0, -1.0])
+        values = self.value(ends.reshape(3, -1)).reshape(-1, 3, 2)
+        # A step is rounded where it is added to a place.
+        apart = np.moveaxis(np.diagonal(ends[:, :, :, 0] - ends[:, :, :, 1], axis1=0, axis2=2), -1, 0)
+        return (values[:, :, 0] - values[:, :, 1]).T / apart, values
 
     def check(self) -> None:
         """Raise unless phi is finite in the box, and its surface is there and has a normal."""
