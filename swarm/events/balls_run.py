@@ -208,7 +208,10 @@ class CollidingRun(BaseRun):
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         place, _v = self._flock.at(self._box.pull, item, self._flock.time(item))
-        return failures.after(self._scene, moment - span, item, status, place, self._now())
+        now, balls = self._now(), self.state.balls
+        assert balls is not None
+        radius = float(balls.radius[item])
+        return failures.after(self._scene_at(now), moment - span, item, status, place, now, radius)
 
     def collisions(self) -> float:
         """How many there were since the start."""

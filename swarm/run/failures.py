@@ -20,6 +20,8 @@ from .starting_state import Seeding
 
 # Of a particle that does not go on, where no user-defined function may be the cause.
 _REPORT = "; if nothing is special about the place, it is an error of swarm: please report it with the scene"
+# Of the size: a ball this near to a wall touches it.
+_TOUCHES = 1e-9
 
 
 def of_frame(
@@ -46,11 +48,30 @@ def of_frame(
     return sentence
 
 
-def after(scene: Scene, before: float, particle: int, status: Status, place: Any, moment: float) -> str:
-    """The sentence about a frame after a time [s] that ended with this particle at its place at a moment [s]."""
+def after(
+    scene: Scene, before: float, particle: int, status: Status, place: Any, moment: float, radius: float | None = None
+) -> str:
+    """The sentence about a frame after a time [s] that ended with this particle at its place at a moment [s].
+
+    A ball has a radius [m].
+    """
+    gap = "" if radius is None or status != Status.TIMELESS else _in_gap(scene, place, moment, radius)
     return (
         f"the frame after {before:g} s failed at particle {particle}: {status.sentence}; it is at "
-        f"{shown(place, 6)} m at {moment:.9g} s{_cause(scene, status)}"
+        f"{shown(place, 6)} m at {moment:.9g} s{gap or _cause(scene, status)}"
+    )
+
+
+def _in_gap(scene: Scene, place: Any, moment: float, radius: float) -> str:
+    """The text about a ball that touches several walls at once; empty if it does not."""
+    outside = scene.distances_outside(np.array(place)[:, None], moment, np.array([radius]))[:, 0]
+    touched = np.flatnonzero(outside >= -_TOUCHES * scene.finite_size()).tolist()
+    if len(touched) < 2:
+        return ""
+    names = " and ".join(_named(scene, wall) for wall in touched)
+    return (
+        f", where it touches {names} at once: a gap as wide as the ball, {2.0 * radius:g} m, leaves it no way between "
+        "two impacts; make the gap wider than that or the ball smaller, or let it not come there"
     )
 
 
