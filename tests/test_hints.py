@@ -60,6 +60,13 @@ def test_what_rests_and_what_falls(caplog):
     assert hints_of(swarm.Scene([BOX], DOWN), particles=AT_REST, caplog=caplog) == []
     (hint,) = hints_of(CELL, caplog=caplog)
     assert "gravity[2] = -9.81 m/s^2 pulls along period[2] = 1 m" in hint
+    for law, comes in (
+        (swarm.Lambert(0.5), True),
+        (swarm.Absorb(0.5), False),
+        (swarm.CercignaniLampis(1.0, 0.5, 0.5), False),
+    ):
+        scene = swarm.Scene([swarm.Cylinder(0.3, laws=[law])], gravity=DOWN, period=(None, None, 1.0))
+        assert bool(hints_of(scene, caplog=caplog)) == comes
     assert hints_of(LOSSY, caplog=caplog) == hints_of(LEVEL, caplog=caplog) == []
 
 

@@ -12,7 +12,7 @@ from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import dot, square
 from ..surfaces.shapes.slab import AXES
-from ..surfaces.wall_law import leave_of, lets_wait, may_end, mirrored
+from ..surfaces.wall_law import leave_of, lets_wait, may_end, mirrored, tries_of
 
 # A squared speed into the wall counts as 0 up to this fraction of the squared speeds before and after the law.
 _ROUND_OFF = 1e-30
@@ -59,6 +59,11 @@ class Laws(Record):
     def give_heat(self):
         """Whether some of it may be heat: a constant for the compiler."""
         return self.send_off and not self.dissipate_all
+
+    def keep_speed(self):
+        """Whether every impact keeps the speed relative to its wall, as far as the trials of the laws say."""
+        own = [law for one in self.own or () for some in one.each for law in some.laws]
+        return not self.loses and self.thermal is None and all(map(_keeps_speed, own))
 
     @property
     def may_end(self):
@@ -228,3 +233,12 @@ def owned_in(
     for some in owned:
         alike.setdefault(tuple((type(law), *(part is None for part in law)) for law in some.laws), []).append(some)
     return tuple(Owned(tuple(each)) for each in alike.values()) or None
+
+
+def _keeps_speed(law: Any) -> bool:
+    """Whether every particle of its trials stays in the run with the speed with which it came, and does not wait."""
+    for v, _n, given in tries_of(law):
+        after, stays, wait = leave_of(given)
+        if not stays or wait > 0.0 or abs(square(after) - square(v)) > KEPT * square(v):
+            return False
+    return True

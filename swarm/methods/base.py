@@ -66,7 +66,7 @@ class Method(Validated):
         """Whether a particle outside its walls by more than round-off is an error rather than wall compliance."""
         return False
 
-    def knows_period(self) -> bool:
+    def supports_period(self) -> bool:
         """Whether its flights end where a particle leaves a cell that repeats, and its contacts do not move."""
         return False
 

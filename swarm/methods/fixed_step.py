@@ -82,7 +82,7 @@ class SoftWalls(base.Method):
     def parts(self, durations: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.round(durations / self.dt)
 
-    def knows_period(self) -> bool:
+    def supports_period(self) -> bool:
         return True
 
     def seldom_hard(self, scene: Scene) -> bool:

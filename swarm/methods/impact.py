@@ -136,7 +136,7 @@ class Impact(base.Method):
     def is_rigid(self) -> bool:
         return True
 
-    def knows_period(self) -> bool:
+    def supports_period(self) -> bool:
         return self.contact_step == 0.0
 
     def may_slide(self) -> bool:

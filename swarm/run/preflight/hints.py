@@ -76,9 +76,10 @@ def _some(count: int) -> slice:
 
 
 def _takes_energy(compiled: CompiledScene) -> bool:
-    """Whether walls have losses or laws, or pairs lose energy: then impacts may take what gravity gives."""
-    pairs = compiled.scene.pairs
-    return (pairs is not None and pairs.restitution < 1.0) or compiled.laws is not None
+    """Whether impacts on walls, or of pairs, may take what gravity gives."""
+    pairs, laws = compiled.scene.pairs, compiled.laws
+    walls_may = laws is not None and (compiled.scene.moves() or not laws.keep_speed())
+    return (pairs is not None and pairs.restitution < 1.0) or walls_may
 
 
 def _warn_of_fall(compiled: CompiledScene) -> None:

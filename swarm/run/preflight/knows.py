@@ -226,7 +226,7 @@ def _lossy_groups(asked: Asked) -> Found:
 
 def _period(asked: Asked) -> Found:
     is_soft = isinstance(asked.particles, TiedParticles) and not isinstance(asked.method, Impact)
-    if asked.scene.period is not None and (is_soft or not asked.method.knows_period()):
+    if asked.scene.period is not None and (is_soft or not asked.method.supports_period()):
         yield {"got": asked.scene.period}
 
 
