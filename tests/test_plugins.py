@@ -258,16 +258,25 @@ SOURCES = [
         0, rate=5.0, even=True, beam=(0.0, 0.0, 1.0), divergence=0.1, within=swarm.Sphere(0.2, (0.0, 0.0, -0.5))
     ),
 ]
+TABLES_OF_SOURCES = [
+    {"where": 1, "rate": 20.0, "temperature": 1.0},
+    {"where": {"surface": 0, "opening": 0}, "count": 5, "speed": 2.0, "start": 0.25, "stop": 0.5, "mass": 2.0},
+    {"where": {"kind": "sphere", "radius": 0.3}, "volume": True, "times": [0.1, 0.2], "speed": 1.0},
+    {
+        "where": 0, "rate": 5.0, "even": True, "beam": [0.0, 0.0, 1.0], "divergence": 0.1,
+        "within": {"kind": "sphere", "radius": 0.2, "center": [0.0, 0.0, -0.5]},
+    },
+]  # fmt: skip
 COUNTERS = [
     swarm.Counter(swarm.Plane((1.0, 0.0, 0.0), 0.1)),
     swarm.Counter(swarm.Plane((0.0, 0.0, 1.0)), inside=swarm.Sphere(0.2)),
 ]
 
 
-def test_sources_and_counters_that_are_written_and_read_again_are_the_same(tmp_path):
+def test_sources_of_tables_and_counters_that_are_written_are_read_as_they_are(tmp_path):
     scene = tables.scene_table(BOTTLE)
     document = scene | {
-        "source": [run_tables.source_table(one, BOTTLE) for one in SOURCES],
+        "source": TABLES_OF_SOURCES,
         "counter": [run_tables.counter_table(one) for one in COUNTERS],
         "method": {"kind": "impact"},
         "run": {"until": 1.0, "every": 0.5, "compile": "never", "seed": 3},

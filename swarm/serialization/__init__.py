@@ -1,1 +1,1 @@
-"""Scenes, methods, sources and counters to and from plain tables, the form of scene files and trajectories."""
+"""Scenes, methods, counters and sources as plain tables, the form of scene files and trajectories."""

@@ -1,6 +1,5 @@
-"""Sources and counters to and from plain tables."""
+"""Counters to and from plain tables, and sources from them."""
 
-import dataclasses
 import tomllib
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -12,8 +11,7 @@ from ..errors import SceneError
 from ..scene import Scene
 from ..sources.source import Source
 from ..surfaces.counter import Counter
-from ..surfaces.union import nodes_of
-from .tables import convert, opening_of, surface_of, table_of, table_of_opening
+from .tables import convert, opening_of, surface_of, table_of
 
 
 def counters_text(counters: Iterable[Counter]) -> str:
@@ -48,27 +46,6 @@ def _counter_of(table: Any, where: str) -> Counter:
         return Counter(**made)
     except SceneError as error:
         raise SceneError(located(where, error)) from None
-
-
-def source_table(source: Source, scene: Scene) -> dict[str, Any]:
-    """The table of a source: a surface of the scene by its number, an opening by that, the part and its own number."""
-    table = {name: value for name, value in vars(source).items() if value is not None and value != _DEFAULTS.get(name)}
-    for name in ("where", "within"):
-        if name in table and not isinstance(table[name], int):
-            table[name] = _place_table(table[name], scene, name)
-    return table
-
-
-def _place_table(place: Any, scene: Scene, name: str) -> Any:
-    for i, surface in enumerate(scene.surfaces):
-        if place is surface and name == "where":
-            return i
-        for at, one in nodes_of(surface):
-            for k, opening in enumerate(one.openings):
-                if place is opening:
-                    part = {"part": at[0] if len(at) == 1 else list(at)} if at else {}
-                    return {"surface": i, **part, "opening": k}
-    return table_of_opening(place, None)
 
 
 def sources_of(given: Any, scene: Scene) -> tuple[Source, ...]:
@@ -107,9 +84,6 @@ def _numbered(where: str, number: Any, known: Any) -> Any:
         there = f"a number from 0 to {len(known) - 1}" if known else "no value, for there is nothing to choose from"
         raise SceneError(f"{where}: expected {there}, got {number!r:.200}")
     return known[number]
-
-
-_DEFAULTS = {field.name: field.default for field in dataclasses.fields(Source)}
 
 
 def _tables(key: str, given: Any) -> list[Any]:

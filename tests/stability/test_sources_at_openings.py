@@ -13,6 +13,7 @@ import tomli_w
 import swarm
 from swarm.serialization import run_tables, tables
 from swarm.sources.births import with_births
+from swarm.surfaces.union import nodes_of
 
 N = 200
 
@@ -80,12 +81,19 @@ def check(seed):
     assert (vessel.phi(r + 1e-6 * v / speed) < 0.0).all(), seed
     assert scene.outside(r, 1e-11).size == 0, seed
     # The same bits from a scene file, which names the opening by its part.
+    surface, part, number = next(
+        (i, at, k)
+        for i, one in enumerate(scene.surfaces)
+        for at, node in nodes_of(one)
+        for k, given in enumerate(node.openings)
+        if given is opening
+    )
+    place = {"surface": surface, "part": list(part), "opening": number}
     table = {
         "surface": [tables.table_of(one) for one in scene.surfaces],
-        "source": [run_tables.source_table(source, scene)],
+        "source": [{"where": place, "count": N, "stop": 1.0, "temperature": 1.0}],
     }
     read = tomllib.loads(tomli_w.dumps(table))
-    assert "opening" in read["source"][0]["where"], seed
     again = tables.scene_of(read["surface"], None)
     births = with_births(again, None, run_tables.sources_of(read["source"], again), seed, 1.0)
     assert np.array_equal(births.position, r), seed
