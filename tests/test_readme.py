@@ -343,3 +343,13 @@ def test_the_modules_that_take_minutes_can_be_called(module, monkeypatch, capsys
         runpy.run_module(name, run_name="__main__")
     assert end.value.code in (0, None)
     assert "usage" in capsys.readouterr().out
+
+
+def test_lines_of_the_guide_fit_beside_a_terminal_of_120_columns():
+    """Those of text: a row of a table, a picture and a line of code are one line each."""
+    long, code = [], re.compile(r"^```.*?^```", flags=re.M | re.S)
+    for page in sorted(GUIDE.rglob("*.md")):
+        text = code.sub(lambda block: "\n" * block[0].count("\n"), page.read_text("utf-8"))
+        lines = enumerate(text.splitlines(), 1)
+        long += [f"{page.name}:{k}" for k, line in lines if len(line) > 120 and not line.startswith(("|", "!["))]
+    assert not long
