@@ -162,6 +162,22 @@ def test_impacts_in_a_gap_of_no_width_are_bounded(monkeypatch):
     assert len(passes) > block.LOOK
 
 
+def test_impacts_in_a_cusp_that_is_thinner_than_round_off_are_bounded(monkeypatch):
+    """Between two balls that touch a particle would turn round after more impacts than a run has."""
+    passes, one_pass = [], block._pass
+
+    def counted(*about):
+        passes.append(1)
+        assert len(passes) <= 4 * block.LOOK
+        return one_pass(*about)
+
+    monkeypatch.setattr(block, "_pass", counted)
+    balls = [swarm.Sphere(1.0, center=(0.0, 0.0, z), side="outside") for z in (1.0, -1.0)]
+    start = swarm.Particles([[-1e-8], [0.0], [0.0]], [[0.9998], [0.0], [0.02]])
+    with pytest.raises(swarm.RunError, match=r"meets its walls without end, as in a cusp"):
+        run_in_plain_python(swarm.Scene([swarm.Sphere(9.0), *balls]), start)
+
+
 @dataclass(frozen=True)
 class Lossy(Mirror):
     """A user-defined method that halves the normal velocity at each impact, and lets no particle rest."""

@@ -116,7 +116,8 @@ def _look(method, walls, state, lanes, live):
     """Whether a particle has too many impacts, or no time has passed since the last look: (status, its lane).
 
     The narrower a wedge is, the more impacts have no time between them. They come to an end, so these are counted.
-    In a gap of no width a particle returns to the state of the last look.
+    In a gap of no width a particle returns to the state of the last look. In a cusp that is thinner than round-off it
+    would not have turned round at the largest number of impacts. What loses energy meanwhile may come to rest.
     """
     # Walls that close on a particle hit it without end; also by safe steps so many hits take only seconds.
     most_hits = 0.1 * MOST_HITS if isinstance(walls, Carried) else MOST_HITS
@@ -129,7 +130,9 @@ def _look(method, walls, state, lanes, live):
             status = Status.STALLED.value
         elif lane.stands(method, p) and lane.looked_hits == lane.hits:
             status = Status.TIMELESS.value
-        elif method.holds and lane.goes_round(p):
+        elif (method.holds and lane.goes_round(p)) or (
+            method.holds and not method.laws.change_energy and lane.hardly_turns(p, most_hits)
+        ):
             status = Status.STALLED.value
         if status != Status.DONE.value:
             put(state.position, 0, lanes.particle[i], lane.r)

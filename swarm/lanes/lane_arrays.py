@@ -1,5 +1,6 @@
 """The particles that are being advanced, one in each lane: arrays that fit in the cache, and the ways in and out."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ from ..contact.uzawa import RECORDS
 from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
-from ..kernel.vector import Vec, column, put, square
+from ..kernel.vector import Vec, column, norm, put, square
 from ..methods import contract as methods
 from ..surfaces.in_motion.moving import Carried
 from ..surfaces.presence.ajar import Faced
@@ -43,6 +44,15 @@ class Flying(Advanced):
         """Whether particle p, of this lane, is what it was when it was looked at: it will be so again without end."""
         off = square(self.r - self.looked_r) + square(self.v - self.looked_v)
         return self.looked_particle == p and self.looked_left == self.remaining and off == 0.0
+
+    def hardly_turns(self, p, most):
+        """Whether particle p, of this lane, stood while it met walls, and does not turn round in so many impacts.
+
+        Between walls whose angle is alpha it turns by alpha at an impact, and leaves after less than half a turn.
+        """
+        stood = self.looked_particle == p and self.looked_left == self.remaining
+        turn, hits = norm(self.v - self.looked_v), self.hits - self.looked_hits
+        return stood and square(self.r - self.looked_r) == 0.0 and most * turn < math.pi * hits * norm(self.v)
 
     def put_end(self, end):
         """Write the place, the velocity and the remaining time at the end of a flight or a contact."""
