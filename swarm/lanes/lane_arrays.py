@@ -48,7 +48,7 @@ class Flying(Advanced):
     def hardly_turns(self, p, most):
         """Whether particle p, of this lane, stood while it met walls, and does not turn round in so many impacts.
 
-        Between walls whose angle is alpha it turns by alpha at an impact, and leaves after less than half a turn.
+        Between walls at an angle it turns by that at an impact, and leaves after less than half a turn.
         """
         stood = self.looked_particle == p and self.looked_left == self.remaining
         turn, hits = norm(self.v - self.looked_v), self.hits - self.looked_hits
