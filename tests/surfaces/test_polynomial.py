@@ -116,6 +116,57 @@ def test_no_root_is_missed_of_many(family, seed):
     _require_first_roots(family, seed)
 
 
+def _fall(wall, place, velocity, pull):
+    """`falling_hit`: numbers of NumPy are divided by 0 as those of kernels are."""
+    with np.errstate(all="ignore"):
+        return wall.falling_hit(*(vec(np.array(one)) for one in (place, velocity, pull)))
+
+
+def _leaves_box(wall, place, velocity, pull):
+    """When a fall leaves the box of a solid, or 0 if it begins outside."""
+    first = math.inf
+    for x, v, g, c, low, high in zip(place, velocity, pull, wall.center, wall.low, wall.high, strict=True):
+        if not low < x - c < high:
+            return 0.0
+        for face in (low, high):
+            roots = np.roots([0.5 * g, v, x - c - face])
+            first = min([first, *(float(t.real) for t in roots if t.real > 0.0 and abs(t.imag) <= 1e-12 * abs(t))])
+    return first
+
+
+def _require_first_roots_of_falls(family, seed, flights=8):
+    random, hits = np.random.default_rng(seed), 0
+    side = str(random.choice(["inside", "outside"]))
+    try:
+        surface = swarm.Formula(family(random), side=side, bounds=BOX, curvature=1.0, center=(0.2, -0.1, 0.1))
+    except swarm.SceneError:
+        return 0  # without a surface, or with a tip
+    wall = surface.numbers()
+    for place, velocity in _flights(random, wall, flights):
+        speed = max(map(abs, velocity))
+        pull = (random.normal(size=3) * speed * speed * 10.0 ** random.choice([-3.0, 0.0, 1.0])).tolist()
+        time, found = _fall(wall, place, velocity, pull)
+        if wall.is_solid and (leaves := _leaves_box(wall, place, velocity, pull)) < time:
+            # What is beyond the bounds of a solid is no wall.
+            time, found = leaves * (1.0 - 1e-9), False
+        hits += found and time < math.inf
+        verdict = Flight([wall], tuple(place), tuple(velocity), tuple(pull)).judge(time, found, 0.0, 4.0 * EPSILON)
+        assert verdict in (EXACT, TOUCHED), (verdict, surface, place, velocity, pull)
+    return hits
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_falls_meet_formulas_of_degree_4_at_the_first_root(family):
+    assert sum(_require_first_roots_of_falls(family, seed, 4) for seed in range(3)) > 3
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("seed", range(100, 150))
+def test_falls_of_many_meet_formulas_of_degree_4_at_the_first_root(family, seed):
+    _require_first_roots_of_falls(family, seed)
+
+
 def _quadric(random):
     """Any of degree 2 or 1: bowls, saddles, sheets, cylinders, planes."""
     few = [one for one in MONOMIALS if sum(one) <= (1 if random.integers(8) == 0 else 2)]
@@ -133,26 +184,25 @@ def test_falls_meet_quadrics_at_the_first_root():
         wall = surface.numbers()
         for place, velocity in _flights(random, wall, 12):
             pull = vec((random.normal(size=3) * 10.0 ** random.choice([-3.0, 0.0, 1.0])).tolist())
-            # Numbers of NumPy are divided by 0 as those of kernels are.
-            with np.errstate(all="ignore"):
-                time, found = wall.falling_hit(*(vec(np.array(one)) for one in (place, velocity, pull)))
+            time, found = _fall(wall, place, velocity, pull)
             verdict = Flight([wall], tuple(place), tuple(velocity), tuple(pull)).judge(time, found, 0.0, 4.0 * EPSILON)
             assert verdict in (EXACT, TOUCHED), (verdict, surface, place, velocity, pull)
             hits += found and time < math.inf
     assert hits > 10
 
 
-def test_a_fall_meets_no_wall_outside_of_the_box_of_a_solid():
-    post = swarm.Formula("x**2 + y**2 - 0.01", side="outside", bounds=((-0.2, -0.2, -1.0), (0.2, 0.2, 1.0))).numbers()
+@pytest.mark.parametrize("text", ["x**2 + y**2 - 0.01", "(x**2 + y**2)**2 - 0.0001"])
+def test_a_fall_meets_no_wall_outside_of_the_box_of_a_solid(text):
+    post = swarm.Formula(text, side="outside", bounds=((-0.2, -0.2, -1.0), (0.2, 0.2, 1.0))).numbers()
     pull = vec((0.0, 0.0, -1.0))
     beyond, beside = vec((1.0, 0.0, -3.0)), vec((1.0, 0.0, 0.5))
     assert math.isinf(post.first_hit(beyond, vec((-1.0, 0.0, -1.0)))[0])
-    time, found = post.falling_hit(beside, vec((-2.0, 0.0, 0.0)), pull)
+    time, found = _fall(post, beside, (-2.0, 0.0, 0.0), pull)
     assert (time, found) == (pytest.approx(0.45), True)
     free = 0.0
     for _step in range(50):
         r = vec((1.0 - free, 0.0, -3.0 - 0.5 * free * free))
-        time, found = post.falling_hit(r, vec((-1.0, 0.0, -free)), pull)
+        time, found = _fall(post, r, (-1.0, 0.0, -free), pull)
         free += time
         if found or free > 4.0:
             break

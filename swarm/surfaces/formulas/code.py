@@ -27,10 +27,12 @@ def class_of(
     phi: Function,
     gradient: Function,
     hessian: Function | None = None,
-    along: Function | None = None,
+    along: tuple[Function | None, ...] = (),
     base: Any = OwnNumbers,
 ) -> Any:
-    """The class of numbers by which kernels call these functions; with `along`, the coefficients of phi along a flight.
+    """The class of numbers by which kernels call these functions; `along` are the coefficients of phi along flights.
+
+    The first function is that of straight flights, the second that of falls.
 
     Raises:
         SceneError: they are not functions of (parameters, x, y, z), or the parameters are no NamedTuple of numbers.
@@ -42,14 +44,13 @@ def class_of(
         checks.number(f"parameters.{name}", value)
     frozen = Frozen(inlined)
     frozen.value(names)
-    copies = []
+    copies: list[Function | None] = []
     for name, function in (("phi", phi), ("gradient", gradient), ("hessian", hessian)):
         if function is not None:
             _check_function(name, function)
             copies.append(frozen.function(function))
     frozen.value(base.__name__)
-    if along is not None:
-        copies.append(frozen.function(along))
+    copies += [None if function is None else frozen.function(function) for function in along]
     name = f"Own_{frozen.digest()}"
     if name not in _classes:
         made: Any = type(OwnNumbers)(  # type: ignore[misc]
@@ -71,10 +72,11 @@ def _check_function(name: str, function: Any) -> None:
 
 def _methods(
     names: tuple[str, ...],
-    phi: Function,
-    gradient: Function,
+    phi: Any,
+    gradient: Any,
     hessian: Function | None = None,
     along: Function | None = None,
+    along_fall: Function | None = None,
 ) -> dict[str, Function]:
     """The methods of the class of numbers."""
     value, slope = _taking_arrays(phi, 1), _taking_arrays(gradient, 3)
@@ -102,9 +104,14 @@ def _methods(
         d = r - self.center
         return along(own(self), d.x, d.y, d.z, v.x, v.y, v.z)  # type: ignore[misc]
 
-    methods = {"phi": phi_of, "gradient": gradient_of}
+    def along_fall_of(self, r, v, half_pull):
+        d, a = r - self.center, half_pull
+        return along_fall(own(self), d.x, d.y, d.z, v.x, v.y, v.z, a.x, a.y, a.z)  # type: ignore[misc]
+
+    methods: dict[str, Function] = {"phi": phi_of, "gradient": gradient_of}
     methods |= {} if hessian is None else {"hessian": hessian_of}
-    return methods if along is None else {**methods, "along": along_of}
+    methods |= {} if along is None else {"along": along_of}
+    return methods if along_fall is None else {**methods, "along_fall": along_fall_of}
 
 
 # --- Arrays of points in plain Python --------------------------------------------------------------------

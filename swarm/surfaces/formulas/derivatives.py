@@ -17,7 +17,7 @@ from .expression import COORDINATES, NonSmoothTerm, parse
 from .form import Form
 from .interval import IntervalBoxes, check_constants, check_smooth
 from .numbers import Bend
-from .series import DEGREE, VELOCITY, LevelSeries
+from .series import DEGREE, HALF_PULL, VELOCITY, LevelSeries
 
 # Operations of the derivatives: beyond, deriving and compiling them would take minutes.
 _MOST_OPERATIONS = 4000
@@ -46,7 +46,9 @@ def derived(text: str, names: tuple[str, ...]) -> "Derived":
     hessian = tuple(sympy.diff(gradient[i], axis) / 2 for i, axis in pairs)
     _check_length(hessian)
     functions = (_function("phi", (phi,)), _function("gradient", gradient), _function("hessian", hessian))
-    return Derived(phi, gradient, hessian, tuple(pieces), axes, functions, _along(phi))
+    along = _along(phi)
+    along_fall = _along_fall(phi) if along is not None and along.degree > 2 else None
+    return Derived(phi, gradient, hessian, tuple(pieces), axes, functions, along, along_fall)
 
 
 def _check_length(rows: Sequence[Any]) -> None:
@@ -67,6 +69,7 @@ class Derived(NamedTuple):
     axes: tuple[Any, ...]
     functions: tuple[Any, ...]
     along: Any  # the function of the coefficients of a polynomial along a straight flight, or None
+    along_fall: Any  # that along a fall of one of degree 3 or 4, or None
 
     def with_values(self, values: tuple[float, ...]) -> "Derived":
         """The expressions with numbers in place of the parameters."""
@@ -76,7 +79,7 @@ class Derived(NamedTuple):
         pieces = tuple(one._replace(argument=one.argument.subs(numbers)) for one in self.pieces)
         check_constants(pieces)
         gradient, hessian = (tuple(one.subs(numbers) for one in rows) for rows in (self.gradient, self.hessian))
-        return Derived(self.phi.subs(numbers), gradient, hessian, pieces, self.axes, self.functions, self.along)
+        return self._replace(phi=self.phi.subs(numbers), gradient=gradient, hessian=hessian, pieces=pieces)
 
     def found_box(self) -> Box | None:
         """A box that surely holds all of phi <= 0 up to the largest cube; None if that is open.
@@ -186,13 +189,20 @@ def _function(name: str, rows: Sequence[Any]) -> Any:
 def _along(phi: Any) -> Any:
     """A function (p, x, y, z, u, v, w) of the coefficients of phi along a flight, None if it is no such polynomial."""
     writer = _DerivativeWriter()
-    found = LevelSeries(writer).of(phi)
+    found = LevelSeries(writer, falls=False).of(phi)
     if found is None:
         return None
     coefficients = found + ["0.0"] * ((2 if len(found) <= 3 else DEGREE) + 1 - len(found))
     function = _made("along", (*COORDINATES, *VELOCITY), writer, coefficients)
     function.degree = len(coefficients) - 1
     return function
+
+
+def _along_fall(phi: Any) -> Any:
+    """A function (p, x, y, z, u, v, w, a, b, c) of the same along a fall, (a, b, c) half its acceleration."""
+    writer = _DerivativeWriter()
+    found = LevelSeries(writer, falls=True).of(phi) or []
+    return _made("along_fall", (*COORDINATES, *VELOCITY, *HALF_PULL), writer, found)
 
 
 def _made(name: str, arguments: Sequence[str], writer: "_DerivativeWriter", results: list[str]) -> Any:

@@ -110,7 +110,7 @@ def _form_of(
     if code.along is not None and code.along.degree > 2:
         is_convex = _seems_convex(phi, hessian, parameters, box, side)
     base = base_of(code.along, is_solid, is_convex, same_in_python)
-    kind = class_of(parameters, phi, gradient, hessian, code.along, base)
+    kind = class_of(parameters, phi, gradient, hessian, (code.along, code.along_fall), base)
     kind.same_in_python = same_in_python
     form = Form(kind, values, box, size, side)
     if box is not None:

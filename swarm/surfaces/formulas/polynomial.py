@@ -1,13 +1,15 @@
-"""Formulas that are polynomials of degree 4 at most, as kernels take them: straight flights by exact coefficients."""
+"""Formulas that are polynomials of degree 4 at most, as kernels take them: their flights by exact coefficients."""
 
 import math
 from typing import Any
 
-from ...kernel.gravity import rise_time_by, rise_time_inside
+from ...kernel.gravity import as_vector, rise_time, rise_time_by, rise_time_inside
 from ...kernel.jit import outlined, select
-from ...kernel.vector import absolute, dot, square, total
+from ...kernel.limits import EPSILON
+from ...kernel.vector import absolute, dot, norm, square, total
 from ..balls.foot_hit import applied
-from ..time_of_impact.course import Quartic, first_rise, level_and_window
+from ..time_of_impact.approach import Approach, LevelBound
+from ..time_of_impact.course import Majorant, Quartic, first_rise, level_and_window
 from ..time_of_impact.polynomial import ConvexFlight, PolynomialFlight
 from .numbers import OwnNumbers, SmoothCavity, SmoothSolid
 
@@ -21,6 +23,29 @@ _REFINED = 1e-4
 _CANCELS = 1.0 / 64.0
 
 
+class _Face(Majorant):
+    """How far within a face of a box a fall is, c + 2 b t + a2 t^2 below 0 beyond it, and when it comes to the face."""
+
+    c: float
+    b: float
+    a2: float
+    time: float
+
+
+def _face(low, high, x, v, pull):
+    """The face beyond which a coordinate is, or any if it is beyond none."""
+    below = x - low < high - x
+    sign = select(below, 1.0, -1.0)
+    c, b, a2 = select(below, x - low, high - x), 0.5 * sign * v, 0.5 * sign * pull
+    return _Face(c, b, a2, select(c < 0.0, rise_time(c, b, a2), 0.0))
+
+
+def _later(one, other):
+    """The face that a fall comes to later."""
+    later = one.time >= other.time
+    return _Face(*(select(later, a, b) for a, b in zip(one, other, strict=True)))
+
+
 class PolynomialNumbers(OwnNumbers):
     """phi is a polynomial of degree 4 at most. Subclasses are a cavity, or a solid with a box that holds it."""
 
@@ -28,6 +53,10 @@ class PolynomialNumbers(OwnNumbers):
 
     def along(self, r, v):
         """The coefficients of phi(r + v t) by powers of t: three, or five."""
+        raise NotImplementedError
+
+    def along_fall(self, r, v, half_pull):
+        """Those of phi(r + v t + G t^2/2) of degree 3 or 4: seven, or nine."""
         raise NotImplementedError
 
     def level_from(self, r, v):
@@ -115,7 +144,7 @@ class QuarticCavity(PolynomialNumbers):
 
     def steps(self, gravity, r, v):
         if gravity is not None:
-            return None
+            return Approach(self, gravity, r, v)
         start, end, (c, twice_b, a2, a3, a4) = self.level_from(r, v)
         speed = total(absolute(v))
         window = _WINDOW * self.size / select(speed > 0.0, speed, 1.0)
@@ -133,6 +162,17 @@ class QuarticCavity(PolynomialNumbers):
             window,
         )
 
+    def near(self, gravity, r, v):
+        return self._near(gravity, r, v)
+
+    def _near(self, gravity, r, v):
+        pull, size = as_vector(gravity), self.size
+        level = tuple(self.side * one for one in self.along_fall(r, v, 0.5 * pull))
+        window = 2.0 * math.sqrt(size * size / (square(v) + size * norm(pull)))
+        # What is left may be as much as a rounding of the place makes of the level.
+        nearly = EPSILON * self.gap_scale(r)
+        return LevelBound(level[0], 0.5 * level[1], level[2], level[3:], window, nearly, True)
+
 
 class ConvexQuarticCavity(QuarticCavity):
     """One that is convex where it was looked at."""
@@ -146,6 +186,20 @@ class QuarticSolid(QuarticCavity):
     is_solid = True
     kept = 7
     aims = False
+
+    def near(self, gravity, r, v):
+        # Outside its box there is no wall, whatever phi is there: a fall comes to each face that it is beyond.
+        level, pull = self._near(gravity, r, v), as_vector(gravity)
+        d, low, high = r - self.center, self.low, self.high
+        coordinates = total(absolute(r)) + total(absolute(self.center))
+        face = _later(_face(low.x, high.x, d.x, v.x, pull.x), _face(low.y, high.y, d.y, v.y, pull.y))
+        face = _later(face, _face(low.z, high.z, d.z, v.z, pull.z))
+        beyond = face.c < -4.0 * EPSILON * coordinates
+        return level._replace(
+            c=select(beyond, face.c, level.c), b=select(beyond, face.b, level.b), a2=select(beyond, face.a2, level.a2),
+            higher=tuple(select(beyond, 0.0, one) for one in level.higher),
+            window=select(beyond, math.inf, level.window), meets=not beyond,
+        )  # fmt: skip
 
 
 def base_of(along: Any, is_solid: bool, is_convex: bool, is_smooth: bool) -> Any:

@@ -1,4 +1,4 @@
-"""A polynomial along a straight flight as a polynomial of time: the text of its coefficients, from the tree of phi.
+"""A polynomial along a flight as a polynomial of time: the text of its coefficients, from the tree of phi.
 
 Sums and products of polynomials of time keep what the user has factored, which costs fewer operations than monomials
 and loses fewer digits.
@@ -8,16 +8,21 @@ from typing import Any
 
 from .expression import COORDINATES
 
-# The degree up to which the level along a flight is solved as a whole, and the names of a flight's velocity.
+# The degree up to which the level along a flight is solved as a whole; the names of a flight's velocity and half pull.
 DEGREE = 4
 VELOCITY = ("u", "v", "w")
+HALF_PULL = ("a", "b", "c")
 
 
 class LevelSeries:
-    """Coefficients of 1, t, t^2, ... of expressions along x + u t, y + v t, z + w t, as names of a writer."""
+    """Coefficients of 1, t, t^2, ... of expressions along x + u t, y + v t, z + w t, as names of a writer.
 
-    def __init__(self, writer: Any) -> None:
+    If it `falls`, along x + u t + a t^2, y + v t + b t^2, z + w t + c t^2.
+    """
+
+    def __init__(self, writer: Any, falls: bool) -> None:
         self._writer = writer
+        self._names = (VELOCITY, HALF_PULL) if falls else (VELOCITY,)
         self._known: dict[Any, list[str] | None] = {}
 
     def of(self, expression: Any) -> list[str] | None:
@@ -30,7 +35,8 @@ class LevelSeries:
         if not any(symbol.name in COORDINATES for symbol in expression.free_symbols):
             return [self._writer.name_of(expression)]
         if expression.is_Symbol:
-            return [expression.name, VELOCITY[COORDINATES.index(expression.name)]]
+            k = COORDINATES.index(expression.name)
+            return [expression.name, *(names[k] for names in self._names)]
         if expression.is_Pow:
             return self._power(expression.base, expression.exp)
         if not (expression.is_Add or expression.is_Mul):
@@ -64,7 +70,7 @@ class LevelSeries:
 
     def _product(self, first: list[str], second: list[str]) -> list[str] | None:
         degree = len(first) + len(second) - 2
-        if degree > DEGREE:
+        if degree > DEGREE * len(self._names):
             return None
         return [self._writer.assign(self._coefficient(first, second, k)) for k in range(degree + 1)]
 
