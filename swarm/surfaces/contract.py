@@ -259,8 +259,14 @@ class Smooth(AtRest):
     kept = 0
     # Whether its steps begin with a guess of the root.
     aims = False
+    # The number of powers of a `fall` that lanes keep for a guess of its root; 0: falls begin without a guess.
+    fall_powers = 0
 
-    def refined(self, r, v, time):
+    def fall(self, gravity, r, v):
+        """The level along a fall as a `PolynomialFall`."""
+        raise NotImplementedError
+
+    def refined(self, gravity, r, v, time):
         """The time that these steps have found, corrected by the level there: that at r has the round-off of r."""
         raise NotImplementedError
 

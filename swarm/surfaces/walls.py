@@ -108,9 +108,9 @@ class Walls(Record):
         """Whether lanes keep the level along a straight flight to each of these walls."""
         return all(wall.kept > 0 for wall in self.each if wall.in_steps)
 
-    def aim(self):
-        """Whether safe steps to some of these walls along a straight flight begin with a guess of the root."""
-        return any(wall.aims for wall in self.each)
+    def aim(self, gravity):
+        """Whether safe steps to some of these walls along a flight begin with a guess of the root."""
+        return any(wall.aims if gravity is None else wall.fall_powers > 0 for wall in self.each)
 
     # --- Their numbers and rows ---
 

@@ -10,6 +10,7 @@ import sympy
 from exact import EXACT, TOUCHED, Flight
 
 import swarm
+from swarm.kernel.gravity import Gravity, accelerated, displacement
 from swarm.kernel.vector import dot, vec
 from swarm.surfaces.formulas.derivatives import derived
 from swarm.surfaces.formulas.numbers import OwnNumbers, SmoothCavity, SmoothSolid
@@ -22,7 +23,7 @@ from swarm.surfaces.formulas.polynomial import (
     QuarticSolid,
 )
 from swarm.surfaces.time_of_impact import flights
-from swarm.surfaces.time_of_impact.polynomial import ConvexFlight, PolynomialFlight
+from swarm.surfaces.time_of_impact.polynomial import ConvexFlight, PolynomialFall, PolynomialFlight
 
 EPSILON = 2.0**-52
 QUARTIC = "x**4/0.09 + y**4/0.09 + z**4/0.13 - 1"
@@ -315,6 +316,74 @@ def test_the_coefficients_are_the_derivatives_along_the_flight(text):
     np.testing.assert_allclose(code.along((), *start, *velocity), expected, rtol=0.0, atol=1e-14)
 
 
+@pytest.mark.parametrize("text", [QUARTIC, RING, "x*y*z - x**3/3 + 2*y - 1", "(x + 2*y)**3*z - (x - z)**2 + x"])
+def test_the_coefficients_of_a_fall_are_the_derivatives_along_it(text):
+    code = derived(text, ())
+    t, rows = sympy.Symbol("t"), ([0.3, -0.2, 0.7], [0.5, 1.0, -0.25], [0.1, -0.3, 0.6])
+    path = {axis: sum(t**k * sympy.Rational(row[i]) for k, row in enumerate(rows)) for i, axis in enumerate(code.axes)}
+    expected = list(map(float, sympy.Poly(code.phi.subs(path), t).all_coeffs()[::-1]))
+    np.testing.assert_allclose(code.along_fall((), *rows[0], *rows[1], *rows[2]), expected, rtol=0.0, atol=1e-14)
+
+
+def _falls(text, count):
+    """Falls from within and from places of impact: (wall, gravity, place, velocity)."""
+    wall, particles = _wall(text), swarm.fill(swarm.Scene([swarm.Formula(text)]), count, speed=0.5, seed=2)
+    for i, (r, v) in enumerate(zip(particles.position.T, particles.velocity.T, strict=True)):
+        gravity, r, v = Gravity(*np.array([0.0, 0.3, -1.0]) * 4.0 ** (i % 3)), vec(r), vec(v)
+        for _impact in range(2):
+            yield wall, gravity, r, v
+            time, _found = _fall(wall, r, v, gravity)
+            place, v = wall.project(r + displacement(gravity, v, time)), accelerated(gravity, v, time)
+            normal = wall.unit_normal(place)
+            r, v = place, v - (2.0 * dot(normal, v)) * normal
+
+
+@pytest.mark.parametrize("text", [QUARTIC, RING])
+def test_guesses_lead_to_most_hits_of_falls_without_safe_steps(text):
+    with np.errstate(all="ignore"):
+        left = [wall.fall(gravity, r, v).aims(math.inf)[1] for wall, gravity, r, v in _falls(text, 30)]
+    assert len(left) == 60
+    assert np.mean(np.array(left) == 0.0) >= 0.9
+
+
+def test_no_guess_of_a_fall_leads_beyond_a_first_root():
+    random, hits = np.random.default_rng(6), 0
+    for _flight in range(150):
+        roots = np.abs(random.normal(size=8)) * random.choice([-1.0, 1.0], 8)
+        near = roots[0] * (1.0 + float(random.choice([0.0, 1e-12, 1e-8, 1e-4, 0.1])) * random.normal())
+        roots[1] = random.choice([near, roots[1]])
+        powers = np.polynomial.polynomial.polyfromroots(roots[: random.choice([6, 8])])
+        level = PolynomialFall(tuple(-np.sign(powers[0]) * powers), 0.5)
+        with np.errstate(all="ignore"):
+            time, left = level.aims(math.inf)
+        if left == 0.0:
+            hits += 1
+            powers = [Fraction(a) for a in level.powers]
+            for part in np.linspace(0.0, 1.0, 65)[:-1]:
+                t = Fraction(float(part * time))
+                terms = [a * t**k for k, a in enumerate(powers)]
+                assert sum(terms) <= 1e-14 * sum(map(abs, terms)), (level, time, part)
+    assert hits > 40
+
+
+def test_lanes_that_fall_beside_a_plane_and_in_a_formula_that_is_turned_keep_their_energy():
+    start = swarm.fill(swarm.Scene([swarm.Formula(QUARTIC)]), 12, speed=1.0, seed=3)
+    turned = swarm.Particles(start.position[[2, 0, 1]], start.velocity[[2, 0, 1]])
+    start = swarm.Particles(start.position, start.velocity)
+    # By a third of a turn about (1, 1, 1) x becomes y, y becomes z, and z becomes x.
+    ends, gravity = [], np.array([0.3, -0.2, -1.0])
+    for rotation, order, particles in ((None, [0, 1, 2], start), ((1.0, 1.0, 1.0, 1.0), [2, 0, 1], turned)):
+        normal, pull = np.array([0.0, 0.0, 1.0])[order], gravity[order]
+        surfaces = [swarm.Formula(QUARTIC, rotation=rotation), swarm.Plane(tuple(normal.tolist()), 0.7)]
+        scene = swarm.Scene(surfaces, tuple(pull.tolist()))
+        end = swarm.simulate(scene, particles, swarm.Impact(), until=2.0, compile="never").particles
+        energy = [0.5 * (one.velocity**2).sum(axis=0) - pull @ one.position for one in (particles, end)]
+        np.testing.assert_allclose(energy[1], energy[0], rtol=0.0, atol=1e-14)
+        assert (scene.distances_outside(end.position, 0.0) <= 1e-15).all()
+        ends.append(end.position)
+    assert ends[1] == pytest.approx(ends[0][[2, 0, 1]], abs=1e-11)
+
+
 @functools.cache
 def _wall(text):
     return swarm.Formula(text).numbers()
@@ -343,3 +412,25 @@ def test_a_place_of_impact_is_on_the_wall_to_four_roundings(text, phi):
             assert abs(float(phi(*exact))) <= 4.0 * EPSILON * max(map(abs, (*r, *end))) * slope
             out = sum(a * b for a, b in zip(normal, v, strict=True))
             r, v = end, v - (2.0 * out) * normal
+
+
+@pytest.mark.parametrize(
+    ("text", "phi"),
+    [
+        (QUARTIC, lambda x, y, z: 100 * (x**4 + y**4) / 9 + 100 * z**4 / 13 - 1),
+        (RING, lambda x, y, z: (x**2 + y**2 + z**2 + sympy.Rational(21, 100)) ** 2 - x**2 - y**2),
+    ],
+)
+def test_a_fall_ends_on_the_wall_to_four_roundings(text, phi):
+    for wall, gravity, r, v in _falls(text, 15):
+        time, found = _fall(wall, r, v, gravity)
+        assert found
+        t = sympy.Rational(float(time))
+        exact = [
+            sympy.Rational(float(a)) + t * sympy.Rational(float(b)) + t * t * sympy.Rational(float(c)) / 2
+            for a, b, c in zip(r, v, gravity, strict=True)
+        ]
+        end = r + displacement(gravity, v, time)
+        # A fall that turns goes over what it comes back from.
+        way = max(abs(a) + abs(b * time) + abs(0.5 * c * time * time) for a, b, c in zip(r, v, gravity, strict=True))
+        assert abs(float(phi(*exact))) <= 4.0 * EPSILON * way * math.hypot(*wall.gradient(end))

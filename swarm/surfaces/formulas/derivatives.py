@@ -202,7 +202,9 @@ def _along_fall(phi: Any) -> Any:
     """A function (p, x, y, z, u, v, w, a, b, c) of the same along a fall, (a, b, c) half its acceleration."""
     writer = _DerivativeWriter()
     found = LevelSeries(writer, falls=True).of(phi) or []
-    return _made("along_fall", (*COORDINATES, *VELOCITY, *HALF_PULL), writer, found)
+    function = _made("along_fall", (*COORDINATES, *VELOCITY, *HALF_PULL), writer, found)
+    function.degree = len(found) - 1
+    return function
 
 
 def _made(name: str, arguments: Sequence[str], writer: "_DerivativeWriter", results: list[str]) -> Any:

@@ -112,6 +112,8 @@ def _form_of(
     base = base_of(code.along, is_solid, is_convex, same_in_python)
     kind = class_of(parameters, phi, gradient, hessian, (code.along, code.along_fall), base)
     kind.same_in_python = same_in_python
+    if code.along_fall is not None and not is_solid:
+        kind.fall_powers = code.along_fall.degree + 1
     form = Form(kind, values, box, size, side)
     if box is not None:
         form.check()

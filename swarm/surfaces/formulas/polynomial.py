@@ -3,14 +3,14 @@
 import math
 from typing import Any
 
-from ...kernel.gravity import as_vector, rise_time, rise_time_by, rise_time_inside
+from ...kernel.gravity import Gravity, accelerated, as_vector, displacement, rise_time, rise_time_by, rise_time_inside
 from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import absolute, dot, norm, square, total
 from ..balls.foot_hit import applied
-from ..time_of_impact.approach import Approach, LevelBound
+from ..time_of_impact.approach import AimedApproach, Approach, LevelBound
 from ..time_of_impact.course import Majorant, Quartic, first_rise, level_and_window
-from ..time_of_impact.polynomial import ConvexFlight, PolynomialFlight
+from ..time_of_impact.polynomial import ConvexFlight, PolynomialFall, PolynomialFlight
 from .numbers import OwnNumbers, SmoothCavity, SmoothSolid
 
 # The first step goes at most so many sizes, by the sum of the components of the velocity: about the longest chord.
@@ -68,9 +68,13 @@ class PolynomialNumbers(OwnNumbers):
         here = select(start < math.inf, start, 0.0)
         return start, end, tuple(side * one for one in self.along(r + here * v, v))
 
-    def refined(self, r, v, time):
+    def refined(self, gravity, r, v, time):
         # One step of Newton's method
-        c, twice_b, a2 = self.along(r + select(time < math.inf, time, 0.0) * v, v)[:3]
+        t = select(time < math.inf, time, 0.0)
+        place, velocity = r + displacement(gravity, v, t), accelerated(gravity, v, t)
+        c, twice_b, a2 = self.along(place, velocity)[:3]
+        if gravity is not None:
+            a2 = a2 + 0.5 * dot(self.gradient(place), as_vector(gravity))
         change = c / select(twice_b == 0.0, 1.0, twice_b)
         small = (abs(change * a2) <= _REFINED * abs(twice_b)) & (abs(change) <= _REFINED * time)
         return time - select(small, change, 0.0)
@@ -85,12 +89,12 @@ class QuadraticCavity(PolynomialNumbers):
         d = b * b - a * c
         if self.is_solid:
             time = start + rise_time_by(c, b, a, d)
-            return self.refined(r, v, select((start <= end) & (time <= end), time, math.inf)), True
+            return self.refined(None, r, v, select((start <= end) & (time <= end), time, math.inf)), True
         # From afar little is left of it; the level half way between both roots is -d/a.
         middle = -b / select(a < 0.0, a, 1.0)
         far = (a < 0.0) & (abs(d) < _CANCELS * b * b) & (middle < math.inf)
         there = self.side * self.phi(r + select(far, middle, 0.0) * v)
-        return self.refined(r, v, rise_time_by(c, b, a, select(far, -a * there, d))), True
+        return self.refined(None, r, v, rise_time_by(c, b, a, select(far, -a * there, d))), True
 
     def course(self, r, v, pull):
         # phi(r + v t + G t^2/2) with H, which is the same everywhere
@@ -140,11 +144,16 @@ class QuarticCavity(PolynomialNumbers):
     @outlined
     def first_hit(self, r, v):
         time, found = first_rise(self.steps(None, r, v))
-        return self.refined(r, v, time), found
+        return self.refined(None, r, v, time), found
+
+    def falling_hit(self, r, v, pull):
+        gravity = Gravity(pull.x, pull.y, pull.z)
+        time, found = self.hit_by_steps(gravity, r, v)
+        return (self.refined(gravity, r, v, time) if self.fall_powers > 0 else time), found
 
     def steps(self, gravity, r, v):
         if gravity is not None:
-            return Approach(self, gravity, r, v)
+            return AimedApproach(self, gravity, r, v) if self.fall_powers > 0 else Approach(self, gravity, r, v)
         start, end, (c, twice_b, a2, a3, a4) = self.level_from(r, v)
         speed = total(absolute(v))
         window = _WINDOW * self.size / select(speed > 0.0, speed, 1.0)
@@ -161,6 +170,19 @@ class QuarticCavity(PolynomialNumbers):
             end,
             window,
         )
+
+    def fall(self, gravity, r, v):
+        """The level along a fall, for a guess of the hit."""
+        near = self._near(gravity, r, v)
+        powers = near.c, 2.0 * near.b, near.a2, *near.higher
+        rest = 0.0
+        for a in reversed(powers[1:]):
+            rest = near.window * (abs(a) + rest)
+        # From the wall inwards
+        leaves = (near.b < 0.0) & (near.c >= -_ROUND_OFF * rest)
+        inward = *powers[1:], 0.0
+        powers = tuple(select(leaves, b, a) for a, b in zip(powers, inward, strict=True))
+        return PolynomialFall(powers, 0.5 * near.window)
 
     def near(self, gravity, r, v):
         return self._near(gravity, r, v)

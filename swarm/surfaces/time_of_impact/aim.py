@@ -16,7 +16,6 @@ from ...kernel.limits import EPSILON
 from ...kernel.vector import norm
 from ..in_motion.drive import Wave
 from ..in_motion.moving import Moving
-from .flights import COURSE
 from .rising import ThirdDerivativeBound, flight_of, nearest_root
 from .safe import closed_hit, seen_by_walls
 from .strides import CLOSED, MET, OTHER, SPEED, TIME
@@ -24,8 +23,8 @@ from .strides import CLOSED, MET, OTHER, SPEED, TIME
 # Of a lane besides what its strides know: the guess, and of each wall until when its passage is free, or else the
 # polynomial at the start.
 _GUESS, WALLS, _OF_WALL = 5, 6, 3
-# After the walls are the sine and the versine of each angle at the guess.
-_OF_WAVE = 2
+# After the walls are the sine and the versine of each angle at the guess, of so many a wall at most.
+_OF_WAVE, _WAVES = 2, 3
 # Improvements of the guess before the last.
 AIMS = 2
 
@@ -95,7 +94,7 @@ def _known_drives(walls):
     """The motions of which the waves are kept: all, if a lane has the rows."""
     drives = walls.drives()
     count = sum(len(drive.rates()) for drive in drives)
-    return drives if count * _OF_WAVE <= len(walls.each) * (COURSE - _OF_WALL) else ()
+    return drives if count <= len(walls.each) * _WAVES else ()
 
 
 def improve(walls, gravity, course, lane, r, v, remaining):

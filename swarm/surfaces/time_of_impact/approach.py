@@ -99,6 +99,19 @@ class Approach(Record):
         return select(goes_on, t + step, t), select(goes_on, length, last)
 
 
+class AimedApproach(Approach):
+    """The same to a wall with a `fall`, a `PolynomialFall`: its first root is guessed."""
+
+    def first_step(self):
+        time, open_ = self.surface.fall(self.gravity, self.r, self.v).aims(math.inf)
+        first, length = self.first_safe_step()
+        return select(open_ > 0.0, first, time), select(open_ > 0.0, length, 0.0)
+
+    def first_safe_step(self):
+        """The first step where no guess has led to the root."""
+        return Approach.first_step(self)
+
+
 def place(gravity, r, v, t, last):
     """The place after the steps of a flight, and the velocity there; its start where there are no more of them."""
     s = select(under_way(t, last), t, 0.0)

@@ -8,7 +8,7 @@ from ...kernel.jit import outlined, select
 from ..presence.rooms import is_of_room, leaving
 from ..walls import Field
 from .course import Fall, Quartic
-from .polynomial import ConvexFlight, PolynomialFlight
+from .polynomial import ConvexFlight, PolynomialFall, PolynomialFlight
 from .straight import Looked, Straight
 
 
@@ -90,12 +90,14 @@ def sooner(time, found, number, later):
 # --- In lanes, by steps ----------------------------------------------------------------------------------
 
 # A flight in lanes: what the safe steps of each wall know, in this many rows a wall.
-COURSE = 9
+COURSE = 13
 _WINDOW, _TIME, _LAST, _CLOSE = 5, 6, 7, 8
 # Of a polynomial all but its window
 _OF_POLYNOMIAL = 0, 1, 2, 3, 4, 5, 8
 # Where a polynomial has no start and end, a guess
 _GUESS = 8
+# Of a fall that begins with a guess all powers
+_OF_FALL = 0, 1, 2, 3, 4, 9, 10, 11, 12
 # Of a flight that is looked at its bounds and its end, and the next look and the last one
 _OF_STRAIGHT = 4, 5, 8
 _OF_LOOKS = 0, 1, 2, 3
@@ -104,7 +106,11 @@ _OF_LOOKS = 0, 1, 2, 3
 def begin(walls, gravity, course, row, lane, r, v, aims=False):
     """The start of a flight for every wall into course[row:, lane]; if it `aims`, without what `turn` to `aimed` do."""
     for k, wall in enumerate(walls.each):
-        at, steps = row + k * COURSE, wall.steps(gravity, r, v)
+        at = row + k * COURSE
+        if aims and gravity is not None and wall.fall_powers > 0:
+            _begin_fall(course, at, lane, wall.fall(gravity, r, v))
+            continue
+        steps = wall.steps(gravity, r, v)
         if steps is None:
             time, found = hit(gravity, wall, r, v)
             course[at + _TIME, lane], course[at + _LAST, lane] = time, select(found, 0.0, math.inf)
@@ -129,6 +135,14 @@ def _begin_polynomial(course, at, lane, flight):
     for i, number in zip(_OF_POLYNOMIAL, flight, strict=False):
         if number is not None:
             course[at + i, lane] = number
+
+
+def _begin_fall(course, at, lane, fall):
+    """The numbers of a fall."""
+    for i, number in zip(_OF_FALL, fall.powers, strict=False):
+        course[at + i, lane] = number
+    course[at + _WINDOW, lane] = fall.window
+    course[at + _TIME, lane], course[at + _LAST, lane] = 0.0, math.inf
 
 
 def _begin_guess(course, at, lane, flight):
@@ -161,54 +175,72 @@ def _keep(course, at, lane, known):
     course[at + _TIME, lane], course[at + _LAST, lane] = known.free, select(known.goes_on, 1.0, 0.0)
 
 
-def turn(walls, course, row, lane):
-    """Where to guess the first hits of a straight flight from, where that is a chain of operations of its own."""
+def turn(walls, gravity, course, row, lane):
+    """Where to guess the first hits of a flight from, where that is a chain of operations of its own."""
     for k, wall in enumerate(walls.each):
-        level = _level(course, row + k * COURSE, lane, wall) if wall.aims else None
+        level = _level(course, row + k * COURSE, lane, wall, gravity) if _is_aimed(wall, gravity) else None
         if level is not None and not isinstance(level, ConvexFlight):
             course[row + k * COURSE + _GUESS, lane] = level.turn()
 
 
-def aim(walls, course, row, lane):
+def aim(walls, gravity, course, row, lane):
     """The guesses."""
     for k, wall in enumerate(walls.each):
-        if wall.aims:
+        if _is_aimed(wall, gravity):
             at = row + k * COURSE
-            course[at + _GUESS, lane] = _level(course, at, lane, wall).aim(course[at + _GUESS, lane])
+            course[at + _GUESS, lane] = _level(course, at, lane, wall, gravity).aim(course[at + _GUESS, lane])
 
 
-def nearer(walls, course, row, lane):
+def nearer(walls, gravity, course, row, lane):
     """The guesses nearer to the hits."""
     for k, wall in enumerate(walls.each):
-        if wall.aims:
-            at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall)
+        if _is_aimed(wall, gravity):
+            at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall, gravity)
             guess = course[at + _GUESS, lane]
             course[at + _GUESS, lane] = select(course[at + _LAST, lane] > 0.0, level.nearer(guess), guess)
 
 
-def aimed(walls, course, row, lane, is_last):
+def aimed(walls, gravity, course, row, lane, is_last):
     """The guesses still nearer; with those that lead to a hit the first step."""
     for k, wall in enumerate(walls.each):
-        if wall.aims:
-            at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall)
+        if _is_aimed(wall, gravity):
+            at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall, gravity)
             guess, length = level.aimed(course[at + _GUESS, lane], course[at + _LAST, lane], is_last)
             course[at + _GUESS, lane], course[at + _LAST, lane] = guess, length
             course[at + _TIME, lane] = select(length > 0.0, 0.0, guess)
 
 
-def leave_free(walls, course, row, lane, remaining):
+def step_off(walls, gravity, course, row, lane, r, v):
+    """The first safe steps of a fall to walls of which no guess has led to the hit."""
+    for k, wall in enumerate(walls.each):
+        if _is_aimed(wall, gravity):
+            at = row + k * COURSE
+            goes_on, (t, length) = course[at + _LAST, lane] > 0.0, wall.steps(gravity, r, v).first_safe_step()
+            course[at + _TIME, lane] = select(goes_on, t, course[at + _TIME, lane])
+            course[at + _LAST, lane] = select(goes_on, length, course[at + _LAST, lane])
+
+
+def leave_free(walls, gravity, course, row, lane, remaining):
     """No more guesses with walls that the flight surely does not meet in this frame."""
     for k, wall in enumerate(walls.each):
-        if wall.aims:
-            at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall)
+        if _is_aimed(wall, gravity):
+            at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall, gravity)
             free = (course[at + _LAST, lane] > 0.0) & level.is_free(remaining)
             course[at + _TIME, lane] = select(free, remaining, course[at + _TIME, lane])
             course[at + _GUESS, lane] = select(free, remaining, course[at + _GUESS, lane])
             course[at + _LAST, lane] = select(free, -1.0, course[at + _LAST, lane])
 
 
-def _level(course, at, lane, wall):
-    """The `PolynomialFlight` to a wall."""
+def _is_aimed(wall, gravity):
+    """Whether a hit with a wall is guessed."""
+    return wall.aims if gravity is None else wall.fall_powers > 0
+
+
+def _level(course, at, lane, wall, gravity):
+    """The `PolynomialFlight`, or `PolynomialFall`, to a wall."""
+    if gravity is not None:
+        powers = tuple(course[at + i, lane] for i in _OF_FALL[: wall.fall_powers])
+        return PolynomialFall(powers, course[at + _WINDOW, lane])
     level = wall.flight(*(course[at + i, lane] for i in _OF_POLYNOMIAL[: wall.kept]))
     return level._replace(window=course[at + _WINDOW, lane]) if wall.aims else level
 
@@ -221,7 +253,7 @@ def step(walls, gravity, course, row, lane, r, v):
             level = Quartic(*(course[at + i, lane] for i in range(_WINDOW + 1)))
             steps = Fall(level, course[at + _CLOSE, lane], wall.may_be_far)
         elif gravity is None and wall.kept > 0:
-            steps = _level(course, at, lane, wall)
+            steps = _level(course, at, lane, wall, gravity)
         else:
             steps = wall.steps(gravity, r, v)
         if isinstance(steps, Straight):
@@ -235,28 +267,28 @@ def end(walls, gravity, course, row, lane, flight, stops=False):
     """`first_hit` from the course of a flight (r, v); if it `stops` with none that goes on in another room."""
     first, k = NEVER, len(walls.shared())
     # A flight that stops is only asked whether it needs more steps.
-    asked = None if stops or gravity is not None else flight
+    asked = None if stops else flight
     for rooms in walls.joined():
         hits: Any = ()
         for room in rooms:
             hits = (
                 *hits,
-                tuple(_known(wall, course, row, k + i, lane, asked) for i, (_n, wall, _g) in enumerate(room)),
+                tuple(_known(wall, gravity, course, row, k + i, lane, asked) for i, (_n, wall, _g) in enumerate(room)),
             )
             k += len(room)
         first = soonest(union_hit(walls, rooms, hits, gravity, flight, stops), 0.0, first)
     for k, (_number, wall) in reversed(tuple(enumerate(walls.shared()))):
-        time, found = _known(wall, course, row, k, lane, asked)
+        time, found = _known(wall, gravity, course, row, k, lane, asked)
         first = sooner(time, found, float(k), first)
     return first
 
 
-def _known(wall, course, row, k, lane, flight):
-    """What the course knows of the hit of a straight flight, or None, with wall k: (time, whether it is one)."""
+def _known(wall, gravity, course, row, k, lane, flight):
+    """What the course knows of the hit of a flight, or None, with wall k: (time, whether it is one)."""
     at = row + k * COURSE
     time, found = course[at + _TIME, lane], course[at + _LAST, lane] == 0.0
-    if flight is not None and wall.kept > 0:
-        time = select(found, wall.refined(*flight, time), time)
+    if flight is not None and (wall.kept > 0 if gravity is None else wall.fall_powers > 0):
+        time = select(found, wall.refined(gravity, *flight, time), time)
     return time, found
 
 

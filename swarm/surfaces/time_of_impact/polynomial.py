@@ -24,6 +24,8 @@ _CONVERGES = 1e-5
 # A guess of the root takes so many times two steps of Halley's method in all; the second of these may change the slope
 # and the time by these parts: the square of one times the other is left, the square of which is round-off.
 AIMED, _HALLEY_CONVERGES, _HALLEY_WAY = 3, 1e-3, 1e-2
+# Along a fall a step leads at most so many times the time ahead, and back to no less than this part of it.
+_AHEAD, _BACK = 2.0, 0.25
 # The root of e x^3 + m x^2 + (1 - 2 m) x = 1 - m is (1 + p e + q e^2)/(1 + (1 + p) e + s e^2), for m of 0 or 1/2 to 9 %
 # up to e = 100.
 _P, _Q, _S = 0.8, 0.01, 0.08
@@ -62,18 +64,21 @@ def _guess(c, b, a2, a3, turn):
     return t + sign * (over / select(under == 0.0, _TINY, under))
 
 
-def _are_below(b0, b1, b2, b3):
-    """Whether a level of degree 4 with these Bernstein coefficients and 0 at the end is surely below 0 until then."""
-    return (b0 < 0.0) & (b1 < 0.0) & (b2 < 0.0) & (b3 < 0.0)
+def _are_below(coefficients):
+    """Whether a level with these Bernstein coefficients is surely below 0, but for its end if that is left out."""
+    below = True
+    for one in coefficients:
+        below = below & (one < 0.0)
+    return below
 
 
-def _are_below_in_halves(b0, b1, b2, b3):
-    """The same by the coefficients of each half, de Casteljau's."""
-    # Twice, four, eight and sixteen times as large
-    first, second, third = b0 + b1, b1 + b2, b2 + b3
-    early, middle, late = first + second, second + third, third + b3
-    before, after = early + middle, middle + late
-    return _are_below(b0, first, early, before) & _are_below(before + after, after, late, b3)
+def _are_below_in_halves(coefficients):
+    """The same, but for the end, by the coefficients of each half, de Casteljau's: twice, four, ... times as large."""
+    below, row = coefficients[0] < 0.0, coefficients
+    for _one in coefficients[1:]:
+        row = tuple(one + other for one, other in zip(row[1:], row[:-1], strict=True))
+        below = below & (row[0] < 0.0) & (row[-1] < 0.0)
+    return below
 
 
 class _HalleyStep(Record):
@@ -85,7 +90,59 @@ class _HalleyStep(Record):
     way: float
 
 
-class PolynomialFlight(Record):
+def _halley_step(value, slope, half, bend):
+    bottom = slope * slope - value * half
+    return _HalleyStep(value, slope, bend, value * slope / select(bottom == 0.0, _TINY, bottom))
+
+
+class Guessed(Record):
+    """A level that is a polynomial of time, of which a guess of the first root above 0 is improved and proven."""
+
+    def turn(self):
+        """Where to guess the first root from."""
+        c, b, a2, a3 = self._cubic()
+        return _turn(c, b, a2, a3)
+
+    def aim(self, turn):
+        """A guess of the first root."""
+        c, b, a2, a3 = self._cubic()
+        return _guess(c, b, a2, a3, turn)
+
+    def _cubic(self):
+        """A cubic that is the level on the wall, and about it up to the window."""
+        raise NotImplementedError
+
+    def aims(self, length):
+        """(the first root or a guess of it, the given length or 0 if it is the root)."""
+        time = self.aim(self.turn())
+        for k in range(AIMED):
+            time, length = self.aimed(self.nearer(time), length, k == AIMED - 1)
+        return time, length
+
+    def nearer(self, t):
+        """A time nearer to the root, by a step of Halley's method."""
+        return t - self._halley(t).way
+
+    def aimed(self, t, length, is_last):
+        """(a time nearer to the root, the length or 0 if one step of Newton's method leads from it to the root)."""
+        step = self._halley(t)
+        root = t - step.way
+        converges = (step.slope > 0.0) & (abs(step.value) * step.bend <= _HALLEY_CONVERGES * (step.slope * step.slope))
+        converges = converges & (abs(step.way) <= _HALLEY_WAY * root)
+        found = converges & self._is_below(root, is_last)
+        goes_on = length > 0.0
+        return select(goes_on, root, t), select(goes_on & found, 0.0, length)
+
+    def _halley(self, t):
+        """A step of Halley's method from a time."""
+        raise NotImplementedError
+
+    def _is_below(self, root, is_last):
+        """Whether it is surely below 0 until a root; the last time by the halves of the way too."""
+        raise NotImplementedError
+
+
+class PolynomialFlight(Guessed):
     """The steps of a flight along which c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4 is to rise through 0.
 
     Of a solid the polynomial begins at the time `since`, and what is after `until` does not count; of a cavity both are
@@ -106,55 +163,29 @@ class PolynomialFlight(Record):
     def first_step(self):
         if self.since is not None:
             return select(self.since <= self.until, self.since, math.inf), 0.5 * self.window
-        time, length = self.aim(self.turn()), 0.5 * self.window
-        for k in range(AIMED):
-            time, length = self.aimed(self.nearer(time), length, k == AIMED - 1)
+        time, length = self.aims(0.5 * self.window)
         return select(length > 0.0, 0.0, time), length
 
-    def turn(self):
-        """Where to guess the first root from."""
-        c, b, a2, a3 = self._cubic()
-        return _turn(c, b, a2, a3)
-
-    def aim(self, turn):
-        """A guess of the first root."""
-        c, b, a2, a3 = self._cubic()
-        return _guess(c, b, a2, a3, turn)
-
     def _cubic(self):
-        """A cubic that is the level on the wall, and above it elsewhere up to the window."""
+        # Above the level where it is not on the wall
         return self.c, 2.0 * self.b, self.a2, self.a3 + self.a4 * self.window
 
-    def nearer(self, t):
-        """A time nearer to the root, by a step of Halley's method."""
-        return t - self._halley(t).way
-
-    def aimed(self, t, length, is_last):
-        """(a time nearer to the root, the length or 0 if one step of Newton's method leads from it to the root)."""
-        step = self._halley(t)
-        root = t - step.way
-        converges = (step.slope > 0.0) & (abs(step.value) * step.bend <= _HALLEY_CONVERGES * (step.slope * step.slope))
-        converges = converges & (abs(step.way) <= _HALLEY_WAY * root)
-        before = self._before(root)
-        # What is below 0 by its coefficients is so by those of its halves.
-        below = _are_below(*before) | (is_last & _are_below_in_halves(*before))
-        found = converges & below
-        goes_on = length > 0.0
-        return select(goes_on, root, t), select(goes_on & found, 0.0, length)
-
     def _halley(self, t):
-        """A step of Halley's method from a time."""
         c, b, a2, a3t, a4t = self.c, 2.0 * self.b, self.a2, t * self.a3, t * t * self.a4
         value = c + t * (b + t * (a2 + a3t + a4t))
         slope = b + t * (2.0 * a2 + 3.0 * a3t + 4.0 * a4t)
         half, bend = a2 + 3.0 * a3t + 6.0 * a4t, abs(a2) + 3.0 * abs(a3t) + 6.0 * abs(a4t)
-        bottom = slope * slope - value * half
-        return _HalleyStep(value, slope, bend, value * slope / select(bottom == 0.0, _TINY, bottom))
+        return _halley_step(value, slope, half, bend)
+
+    def _is_below(self, root, is_last):
+        before = self._before(root)
+        # What is below 0 by its coefficients is so by those of its halves.
+        return _are_below(before) | (is_last & _are_below_in_halves((*before, 0.0)))
 
     def is_free(self, until):
         """Whether it is surely below 0 until this time."""
         last = self.c + until * (2.0 * self.b + until * (self.a2 + until * (self.a3 + until * self.a4)))
-        return _are_below(*self._before(until)) & (last < 0.0)
+        return _are_below(self._before(until)) & (last < 0.0)
 
     def _before(self, t):
         """Its Bernstein coefficients from 0 to t but for the last; until then it is nowhere above the largest."""
@@ -198,3 +229,56 @@ class ConvexFlight(PolynomialFlight):
     def turn(self):
         _c, _b, a2, a3 = self._cubic()
         return -a2 / select(a3 == 0.0, _TINY, 3.0 * a3)
+
+
+class PolynomialFall(Guessed):
+    """A level of any degree along a fall, by its coefficients from that of t^0 on, and a time to cross the surface."""
+
+    powers: Any
+    window: float
+
+    def aim(self, turn):
+        # The cubic may have no root, or one far beyond.
+        time, longest = Guessed.aim(self, turn), 2.0 * self.window
+        return select((time > 0.0) & (time < longest), time, longest)
+
+    def _cubic(self):
+        # The level there, with the terms from t^3 on as they are half the way across
+        c, b, a2 = self.powers[:3]
+        a3 = 0.0
+        for a in reversed(self.powers[3:]):
+            a3 = a + self.window * a3
+        return c, b, a2, a3
+
+    def _halley(self, t):
+        value, slope, half, bend = self.powers[-1], 0.0, 0.0, 0.0
+        for a in reversed(self.powers[:-1]):
+            half = slope + t * half
+            slope = value + t * slope
+            value = a + t * value
+        for k in range(len(self.powers) - 1, 1, -1):
+            bend = 0.5 * k * (k - 1) * abs(self.powers[k]) + t * bend
+        step = _halley_step(value, slope, half, bend)
+        # Where a level falls slowly, or not at all, a step goes nowhere near.
+        longest, shortest = (1.0 - _BACK) * t, (1.0 - _AHEAD) * t
+        way = select(step.way < longest, select(step.way > shortest, step.way, shortest), longest)
+        return step._replace(way=way)
+
+    def is_free(self, until):
+        """Whether it is surely below 0 until this time."""
+        return _are_below(self._bernstein(until))
+
+    def _is_below(self, root, is_last):
+        before = self._bernstein(root)[:-1]
+        return _are_below(before) | (is_last & _are_below_in_halves((*before, 0.0)))
+
+    def _bernstein(self, t):
+        """Its Bernstein coefficients from 0 to t: b_j = sum C(j, k) a_k t^k/C(n, k), by Pascal's triangle."""
+        n, power = len(self.powers) - 1, 1.0
+        row: Any = ()
+        for k, a in enumerate(self.powers):
+            row = (*row, power * a * (1.0 / math.comb(n, k)))
+            power = power * t
+        for k in range(n):
+            row = (*row[: k + 1], *(one + other for one, other in zip(row[k:-1], row[k + 1 :], strict=True)))
+        return row
