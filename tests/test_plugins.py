@@ -397,3 +397,14 @@ def test_a_trajectory_of_a_user_defined_method_is_read_without_its_code(tmp_path
     assert (shown.returncode, "Mirror" in shown.stdout) == (0, True)
     with plugins.allowed([METHOD]), swarm.load(path) as trajectory:
         assert trajectory.method == Mirror()
+
+
+def test_a_user_defined_method_may_say_by_the_earlier_name_that_it_supports_a_period():
+    with pytest.warns(DeprecationWarning, match="Wrapped.knows_period is now supports_period"):
+
+        class Wrapped(Mirror):
+            def knows_period(self):
+                return True
+
+    assert Wrapped().supports_period()
+    assert not Mirror().supports_period()

@@ -1,6 +1,7 @@
 """The description of a method for users, checked. Methods as kernels take them are in contract.py."""
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -26,6 +27,13 @@ SHORTEST = 1e-4
 @dataclass(frozen=True)
 class Method(Validated):
     """A way to advance particles. See the subclasses."""
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        earlier = vars(cls).get("knows_period")
+        if earlier is not None:
+            warnings.warn(f"{cls.__name__}.knows_period is now supports_period", DeprecationWarning, stacklevel=2)
+            cls.supports_period = earlier  # type: ignore[method-assign]
 
     def check(self, scene: Scene, particles: Particles) -> None:
         """Raise a `SceneError` if this method cannot run this scene with these particles."""
