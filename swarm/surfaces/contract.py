@@ -323,10 +323,14 @@ class Smooth(AtRest):
 
     # --- Contact: a step r1 = r0 + p - kappa D(r0, r1) with the free displacement p = h v0 + h^2 G/2 ---
 
+    def mean_gradient(self, r0, r1):
+        """What a discrete gradient corrects: grad q(m) of the midpoint m, or another mean to second order."""
+        return self.inner_gradient(0.5 * (r0 + r1))
+
     def discrete_gradient(self, r0, r1):
         """Discrete gradient of q: D.(r1 - r0) = q1 - q0. Gonzalez's; grad q(m) of the midpoint m for a quadric."""
         # grad q(m) + (q1 - q0 - grad q(m).d)/|d|^2 d
-        g = self.inner_gradient(0.5 * (r0 + r1))
+        g = self.mean_gradient(r0, r1)
         d = r1 - r0
         d2 = square(d)
         rest = self.difference(r0, r1) - g.x * d.x - g.y * d.y - g.z * d.z
@@ -339,7 +343,7 @@ class Smooth(AtRest):
         """
         if self.gives("discrete_gradient"):
             return self.discrete_gradient(r0, r1)
-        g, d = self.inner_gradient(0.5 * (r0 + r1)), r1 - r0
+        g, d = self.mean_gradient(r0, r1), r1 - r0
         d2, rest = square(d), self.difference(r0, r1) - dot(g, d)
         noise = IDENTITY * total(times(absolute(g), absolute(r0) + absolute(r1)))
         # All of it from twice the noise on, without a jump.

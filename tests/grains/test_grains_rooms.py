@@ -7,6 +7,7 @@ import pytest
 
 import swarm
 from swarm.kernel.vector import Vec
+from swarm.surfaces.rotation import matrix
 
 BIN = swarm.Union([swarm.Cylinder(0.02, length=0.2, center=(0.0, 0.0, 0.1)), swarm.Cylinder(0.01, length=0.2)])
 SPHERES = swarm.Union([swarm.Sphere(0.1, (-0.06, 0.0, 0.0)), swarm.Sphere(0.08, (0.06, 0.0, 0.0))])
@@ -184,3 +185,114 @@ def test_a_lid_closes_each_room_of_a_union():
     assert (low[2], high[2]) == (-0.02, 0.06)
     assert high[0] == pytest.approx(0.08 * math.tan(0.5), rel=1e-12)
     assert len(swarm.fill(scene, 10, speed=1.0)) == 10
+
+
+# --- What a ball stores at walls that rooms have in common, or that join in a corner -------------------------
+
+
+def stored(union, places, radius):
+    """The sum of the squares of the gaps of balls at places (3, N) over all walls."""
+    walls = [wall.grown(radius) for wall in swarm.Scene([union]).compiled(radius).walls().each]
+    return np.array([sum(max(wall.phi(Vec(*place)), 0.0) ** 2 for wall in walls) for place in places.T.tolist()])
+
+
+def in_a_box(half, places, radius):
+    """The same in a box about the origin: each side is a spring."""
+    return (np.maximum(radius - (np.array(half)[:, None] - np.abs(places)), 0.0) ** 2).sum(axis=0)
+
+
+TUNNEL = swarm.Union([
+    swarm.Box((0.5, 0.5, 0.5), (-1.2, 0.0, 0.0)), swarm.Box((0.5, 0.5, 0.5), (1.2, 0.0, 0.0)),
+    swarm.Box((2.0, 0.3, 0.3)),
+])  # fmt: skip
+TURN = {"axis": (0.3, -0.2, 1.0), "angle": 0.7}
+
+
+@pytest.mark.parametrize(("shift", "order"), [(0.35, 1), (0.1 + 0.2, 1), (0.2, -1), (0.0, 1)])
+def test_a_wall_that_two_rooms_share_is_one_spring(shift, order):
+    """Boxes that touch, that overlap, or that are the same one, against one long box."""
+    parts = [swarm.Box((0.35, 0.4, 0.45), (x, 0.0, 0.0)) for x in (-shift, shift)][::order]
+    half = 0.35 + shift, 0.4, 0.45
+    places = np.random.default_rng(3).uniform(-1.0, 1.0, (3, 60)) * (np.array(half)[:, None] - 0.03)
+    places[0, :10] = 0.0
+    places[0, 10:20] = 0.35 - shift
+    found, exact = stored(swarm.Union(parts), places, 0.1), in_a_box(half, places, 0.1)
+    assert (exact > 0.0).sum() >= 10
+    assert found == pytest.approx(exact, abs=1e-15)
+
+
+def test_a_round_wall_that_two_rooms_share_is_one_spring():
+    tubes = [swarm.Cylinder(0.4, (1.0, 0.0, 0.0), 0.8, (x, 0.0, 0.0)) for x in (-0.2, 0.2)]
+    capsule = swarm.Sphere(0.4), swarm.Cylinder(0.4, (1.0, 0.0, 0.0), 0.6, (-0.3, 0.0, 0.0))
+    turned = [swarm.Box((0.35, 0.4, 0.45), (x, 0.0, 0.0)) for x in (-0.3, 0.3)]
+    random = np.random.default_rng(4)
+    places = random.uniform(-1.0, 1.0, (3, 60)) * np.array([0.25, 0.25, 0.25])[:, None]
+    places = places[:, np.linalg.norm(places, axis=0) < 0.38]
+    deep = np.maximum(np.hypot(places[1], places[2]) - 0.3, 0.0) ** 2
+    assert stored(swarm.Union(tubes), places, 0.1) == pytest.approx(deep, abs=1e-15)
+    round_end = np.where(places[0] > 0.0, np.maximum(np.linalg.norm(places, axis=0) - 0.3, 0.0) ** 2, deep)
+    assert stored(swarm.Union(capsule), places, 0.1) == pytest.approx(round_end, abs=1e-15)
+    twice = np.maximum(np.linalg.norm(places, axis=0) - 0.3, 0.0) ** 2
+    assert stored(swarm.Union([swarm.Sphere(0.4), swarm.Sphere(0.4)]), places, 0.1) == pytest.approx(twice, abs=1e-15)
+    union = swarm.Union(turned, rotation=TURN)
+    places = random.uniform(-1.0, 1.0, (3, 60)) * np.array([0.6, 0.37, 0.42])[:, None]
+    there = matrix(swarm.Box((1, 1, 1), rotation=TURN).rotation) @ places
+    assert stored(union, there, 0.1) == pytest.approx(in_a_box((0.65, 0.4, 0.45), places, 0.1), abs=1e-14)
+
+
+def near_the_mouth(places, radius):
+    """The same near the end of the corner of a tunnel, at (-0.7, 0.3, 0.3), in closed form."""
+    x, y, z = places - np.array([-0.7, 0.3, 0.3])[:, None]
+    inside, before = np.maximum(-x, 0.0), x < 0.0
+    one, other, end = np.hypot(inside, y), np.hypot(inside, z), np.hypot(inside, np.hypot(y, z))
+    found = sum(np.maximum(radius - away, 0.0) ** 2 for away in (one, other)) - np.maximum(radius - end, 0.0) ** 2
+    return np.where(before & ((y > 0.0) | (z > 0.0)), np.maximum(radius + x, 0.0) ** 2, found)
+
+
+def test_a_ball_in_the_corner_of_a_tunnel_is_held_by_both_sides():
+    places = np.random.default_rng(5).uniform(-1.0, 1.0, (3, 4000)) * np.array([1.9, 0.29, 0.29])[:, None]
+    deep = places[:, np.abs(places[0]) < 0.6][:, :100]
+    # A ball that reaches the corner itself is deeper than any that steps follow.
+    deep = deep[:, np.hypot(*(0.3 - np.abs(deep[1:]))) > 0.05]
+    assert stored(TUNNEL, deep, 0.05) == pytest.approx(in_a_box((2.0, 0.3, 0.3), deep, 0.05), abs=1e-15)
+    # At its mouth too, and the spring of the second side ends there without a jump.
+    mouth = np.array([-0.7, 0.3, 0.3])[:, None] + np.random.default_rng(6).uniform(-0.06, 0.06, (3, 100))
+    mouth = mouth[:, TUNNEL.phi(mouth) < 0.0]
+    assert stored(TUNNEL, mouth, 0.05) == pytest.approx(near_the_mouth(mouth, 0.05), abs=1e-14)
+
+
+def test_the_force_in_a_corner_is_the_slope_of_what_is_stored():
+    scene = swarm.Scene([TUNNEL]).compiled(0.05).walls()
+    (wall,) = (one.grown(0.05) for one in scene.each if one.corners)
+    h, steps = 1e-6, [Vec(*row) for row in np.eye(3).tolist()]
+    places = np.array([-0.7, 0.3, 0.3]) + np.random.default_rng(7).uniform(-0.05, 0.05, (60, 3))
+    asked = [Vec(*place) for place in places[TUNNEL.phi(places.T) < 0.0].tolist()]
+    deep = [place for place in asked if wall.phi(place) > 1e-3]
+    assert len(deep) > 20
+    for place in deep:
+        slope = [(wall.phi(place + h * one) - wall.phi(place - h * one)) / (2.0 * h) for one in steps]
+        assert np.array(wall.gradient(place)) == pytest.approx(slope, abs=1e-6)
+
+
+@pytest.mark.parametrize("shift", [0.35, 0.3])
+def test_a_grain_slides_over_the_end_of_a_room_as_in_one_long_box(shift):
+    rooms = swarm.Union([swarm.Box((0.35, 0.4, 0.45), (x, 0.0, 0.0)) for x in (-shift, shift)])
+    grain = swarm.Particles((-0.1, 0.0, -0.4001), (1.0, 0.0, 0.0), radius=0.05)
+    ends = []
+    for wall in (rooms, swarm.Box((0.35 + shift, 0.4, 0.45))):
+        scene, method = swarm.Scene([wall], (0.0, 0.0, -9.81)), swarm.Penalty(dt=4e-3, penalty=1e4)
+        ends.append(swarm.simulate(scene, grain, method, until=0.2, every=0.04, compile="never"))
+    assert ends[0].particles.position == pytest.approx(ends[1].particles.position, abs=1e-12)
+    assert ends[0].particles.velocity == pytest.approx(ends[1].particles.velocity, abs=1e-12)
+    assert ends[0].observables["energy_error"].max() < 1e-14
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("v", [(-1.0, 0.0, 0.0), (-1.0, 0.3, 0.1)])
+def test_a_grain_that_leaves_a_tunnel_in_its_corner_keeps_its_energy(v):
+    grain = swarm.Particles((-0.66, 0.2501, 0.2501), v, radius=0.05)
+    scene, method = swarm.Scene([TUNNEL], (0.0, 9.0, 9.0)), swarm.Penalty(dt=1e-3, penalty=1e4)
+    result = swarm.simulate(scene, grain, method, until=0.06, every=0.02, compile="never")
+    assert result.observables["contact_energy"].max() > 0.0
+    assert result.particles.position[0, 0] < -0.7
+    assert result.observables["energy_error"].max() < 1e-14

@@ -44,7 +44,8 @@ again when free steps were jumped over at once: 9e-15 and 1e-11 at their ends, a
 Nine runs of a formula of degree 4 that falls were written again when the level along a fall took the coefficients of a
 polynomial of degree 8, its first root a guess and a proof: hits to round-off, 8e-12 at their ends.
 Two cells of balls in a union were written again when flights took longer steps and no bisection of round-off: 4e-16 at
-their ends; and again when corners that two rooms have in common were no edges any more.
+their ends; and again when corners that two rooms have in common were no edges any more; and again when walls that two
+rooms have in one place became one wall: the same ends by the bits, and a number fewer for each of these walls.
 
 The runs "cell: ..." are those of cells of `bench.cells` that work, one kind of wall for each engine and capability, and
 their digests are of the final state, the observables and the datasets of the trajectory, but for dates, versions,

@@ -3,7 +3,16 @@
 A face is a wall of a room. It is *seen*, that is, there, at places that are in no other room. An edge is where walls
 of two rooms cross; balls turn about it. A tip is a place where walls of three rooms meet. The *foot* of a ball is the
 place of a face or an edge that is nearest to it. On an edge Newton's method finds it: each step goes to the place
-nearest to the ball on the line in both tangent planes.
+nearest to the ball on the line in both tangent planes. Faces that edges join, and those in one place, are one wall.
+
+A soft ball at such a wall is pushed from its nearest place, by a gap g = R - d at the distance d. Two faces of a room
+may join in a corner around the balls, while both are of one wall, as the sides of a tunnel are by the rim of its mouth.
+There a ball has a spring at each: the gap of the wall is the root of the sum of the squares,
+
+    g^2 = g(nearest)^2 + sum over corners of (g(one)^2 - g(corner)^2)                                             (1)
+
+with the farther one of both faces, and the nearest place of the corner. The distances are those to all places of a face
+with its edges, so that g goes on without a jump where a ball leaves the tunnel: there both are as far as the corner.
 
 Flights of hard balls take safe steps. Where the foot on a face is seen, a flight is free until it meets the parallel
 surface. Near an edge it is free for a time that follows from the curvature of the edge. A hidden face is not met before
@@ -60,6 +69,22 @@ class RoomEdge(Record):
         return 1.0 / math.sqrt(bend2) if bend2 > 0.0 else math.inf
 
 
+class RoomSide(Record):
+    """A face that makes a corner with another one, and the edges that it ends at."""
+
+    face: RoomFace
+    edges: Any
+
+
+class RoomCorner(Record):
+    """Where two faces of one room, and of one wall, join around the balls."""
+
+    line: RoomEdge  # where they cross
+    one: RoomSide
+    other: RoomSide
+    ends: Any  # places where that ends at another room
+
+
 class Rim(Record):
     """The surface at a radius around an edge, next to a ball: the foot of the ball, and its distance `away`."""
 
@@ -87,6 +112,7 @@ class JoinedFaces(Smooth):
     faces: Any
     edges: Any
     tips: Any  # places
+    corners: Any  # `RoomCorner`s
     radius: Any  # of a ball [m]
     slack: float  # round-off of a place [m]
     most: float  # farther than anything [m]
@@ -97,17 +123,20 @@ class JoinedFaces(Smooth):
         return self._replace(radius=radius)
 
     def phi(self, r):
-        return self.radius - nearest(self, r)[0]
+        return self.distance(r) if len(self.corners) == 0 else _pressed(self, r)[0]
 
     def gradient(self, r):
-        away, place = nearest(self, r)
-        return (place - r) * (1.0 / select(away > 0.0, away, 1.0))
+        return self.unit_normal(r) if len(self.corners) == 0 else _pressed(self, r)[1]
+
+    def mean_gradient(self, r0, r1):
+        return self.gradient(0.5 * (r0 + r1)) if len(self.corners) == 0 else _by_depth(self, r0, r1)
 
     def distance(self, r):
-        return self.phi(r)
+        return self.radius - nearest(self, r)[0]
 
     def unit_normal(self, r):
-        return self.gradient(r)
+        away, place = nearest(self, r)
+        return _towards(place, r, away)
 
     def clearance(self, r):
         return at_least(self, r) - self.radius
@@ -133,15 +162,83 @@ def nearest(wall, r):
         better = is_seen(wall.rooms, face.rooms, foot, wall.slack) & (away < best)
         best, place = select(better, away, best), either(better, foot, place)
     for edge in wall.edges:
-        foot = crossing(edge.one, edge.other, r, _FAR * wall.radius)
-        away = norm(foot - r)
-        on_both = max(abs(edge.one.distance(foot)), abs(edge.other.distance(foot))) <= wall.slack
-        better = on_both & is_seen(wall.rooms, edge.rooms, foot, wall.slack) & (away < best)
-        best, place = select(better, away, best), either(better, foot, place)
+        best, place = _or_on_edge(wall, edge, r, (best, place))
     for tip in wall.tips:
-        away = norm(tip - r)
-        better = away < best
-        best, place = select(better, away, best), either(better, tip, place)
+        best, place = _or_at(tip, r, (best, place))
+    return best, place
+
+
+def _or_on_edge(wall, edge, r, known):
+    """(distance, place) of the nearest place of an edge, or of one that is known and no farther."""
+    foot = crossing(edge.one, edge.other, r, _FAR * wall.radius)
+    on_both = max(abs(edge.one.distance(foot)), abs(edge.other.distance(foot))) <= wall.slack
+    best, place = known
+    away = norm(foot - r)
+    better = on_both & is_seen(wall.rooms, edge.rooms, foot, wall.slack) & (away < best)
+    return select(better, away, best), either(better, foot, place)
+
+
+def _or_at(tip, r, known):
+    """(distance, place) of a tip, or of a place that is known and no farther."""
+    best, place = known
+    away = norm(tip - r)
+    better = away < best
+    return select(better, away, best), either(better, tip, place)
+
+
+def _towards(place, r, away):
+    """The unit vector from r to a place at this distance."""
+    return (place - r) * (1.0 / select(away > 0.0, away, 1.0))
+
+
+@outlined
+def _pressed(wall, r):
+    """(gap, its gradient) of a soft ball."""
+    away, place = nearest(wall, r)
+    gap, n = wall.radius - away, _towards(place, r, away)
+    if gap > 0.0:
+        # (1)
+        squares, push = gap * gap, gap * n
+        for corner in wall.corners:
+            if max(abs(corner.line.one.distance(r)), abs(corner.line.other.distance(r))) < wall.radius:
+                second, its_place, third, end = _in_corner(wall, corner, r)
+                g, h = max(wall.radius - second, 0.0), max(wall.radius - third, 0.0)
+                squares += g * g - h * h
+                push = push + g * _towards(its_place, r, second) - h * _towards(end, r, third)
+        gap = math.sqrt(squares)
+        n = push * (1.0 / gap)
+    return gap, n
+
+
+def _by_depth(wall, r0, r1):
+    """The mean of the gradients at both ends, by how deep they are: outside there is that of one spring."""
+    (g0, n0), (g1, n1) = _pressed(wall, r0), _pressed(wall, r1)
+    a, b = max(g0, 0.0), max(g1, 0.0)
+    is_in = a + b > 0.0
+    a, b = select(is_in, a, 0.5), select(is_in, b, 0.5)
+    return (1.0 / (a + b)) * (a * n0 + b * n1)
+
+
+@outlined
+def _in_corner(wall, corner, r):
+    """(distance, place) of the farther one of both faces of a corner, and of the corner itself."""
+    best, place = _or_on_edge(wall, corner.line, r, (wall.most, r))
+    for end in corner.ends:
+        best, place = _or_at(end, r, (best, place))
+    one, its_place = _on_side(wall, corner.one, r, (best, place))
+    other, others_place = _on_side(wall, corner.other, r, (best, place))
+    return max(one, other), either(one > other, its_place, others_place), best, place
+
+
+def _on_side(wall, side, r, known):
+    """(distance, place) of the nearest place of a face with its edges, no farther than a place that is known."""
+    best, place = known
+    foot = r - side.face.wall.distance(r) * outward(side.face.wall, r)
+    away = norm(foot - r)
+    better = is_seen(wall.rooms, side.face.rooms, foot, wall.slack) & (away < best)
+    best, place = select(better, away, best), either(better, foot, place)
+    for edge in side.edges:
+        best, place = _or_on_edge(wall, edge, r, (best, place))
     return best, place
 
 

@@ -20,7 +20,7 @@ from ..shapes.slab import Slab
 from ..shapes.sphere import Sphere
 from ..surface import Box as Bounds
 from ..surface import Surface
-from .joined_faces import FLAT, JoinedFaces, RoomEdge, RoomFace, crossing, is_seen, outward
+from .joined_faces import FLAT, JoinedFaces, RoomCorner, RoomEdge, RoomFace, RoomSide, crossing, is_seen, outward
 from .tip import TipPlane
 
 # Parts of the extent: the round-off of a place, and a distance that is larger than any other.
@@ -38,6 +38,8 @@ _BESIDE = 1e5
 # The most steps of Newton's method to a tip; one that is no longer than this round-off of a place is the last. Walls
 # with normals that span no more than this volume do not meet at a point.
 _SWEEPS, _STILL, _PARALLEL = 30, 4.0 * EPSILON, 1e-9
+# Of normals of walls that go on smoothly, the most that their cosine is below 1; steps onto a wall.
+_SMOOTH, _PROJECTIONS = 1e-9, 4
 # What all parts of a union that balls meet must have in common.
 _LAWS = "restitution", "friction", "temperature", "accommodation", "laws"
 _CHANGES = "motion", "openings", "present", "mass", "inertia"
@@ -137,20 +139,21 @@ def _walls_of(joined: JoinedRooms) -> tuple[Any, ...]:
 
 
 def _made(joined: JoinedRooms) -> list[JoinedFaces]:
-    rooms = tuple(tuple(wall for _surface, wall in _each(room)) for room in joined.rooms_of)
+    each = [list(_each(room)) for room in joined.rooms_of]
+    rooms = tuple(tuple(wall for _surface, wall in room) for room in each)
     extent = joined.extent()
     slack, bounds = _SLACK * extent, [room_bounds(room) for room in joined.rooms_of]
     faces = [
         RoomFace(wall, (k, k), *_bend_of(one, wall))
-        for k, room in enumerate(joined.rooms_of) for one, wall in _each(room)
+        for k, room in enumerate(each) for one, wall in room
     ]  # fmt: skip
     first = np.cumsum([0, *map(len, rooms)]).tolist()
     group, edges = list(range(len(faces))), []
     tips: list[tuple[int, Vec]] = []
     for edge, (k, a), (m, b) in _edges_of(rooms):
         places = _places_in((bounds[k], bounds[m]), extent, slack)
-        on_it = [place for place in _crossings(edge, places) if _is_on((edge.one, edge.other), place, slack)]
-        starts = [x + way * along for x in on_it for along in [_along(edge, x)] for way in (0.0, extent, -extent)]
+        on_it = _places_on(edge, places, slack)
+        starts = _starts_along(edge, on_it, extent)
         ends = list(_tips_of(edge, starts, rooms, bounds, slack))
         if ends or any(_is_seen_at(edge, rooms, place, slack) for place in on_it) or _turns(edge, starts, rooms, slack):
             edge = edge._replace(bend=_bend_on(edge, on_it))
@@ -159,11 +162,17 @@ def _made(joined: JoinedRooms) -> list[JoinedFaces]:
             edges.append((first[k] + a, edge))
             new = (x for x, known in ends if all(norm(x - tip) > known for _i, tip in tips))
             tips.extend((first[k] + a, tip) for tip in new)
+    for edge, (k, a), (m, b) in _edges_of(rooms):
+        one, other = group[first[k] + a], group[first[m] + b]
+        if one != other and _are_one(edge, rooms, _places_in((bounds[k], bounds[m]), extent, slack), slack):
+            group = [one if g == other else g for g in group]
+    corners = list(_corners_of(faces, group, [edge for _i, edge in edges], rooms, bounds, extent))
     return [
         JoinedFaces(
             rooms, tuple(face for face, g in zip(faces, group, strict=True) if g == mine),
             tuple(edge for i, edge in edges if group[i] == mine),
-            tuple(tip for i, tip in tips if group[i] == mine), 0.0, slack, _FAR * extent,
+            tuple(tip for i, tip in tips if group[i] == mine),
+            tuple(corner for i, corner in corners if group[i] == mine), 0.0, slack, _FAR * extent,
         )
         for mine in dict.fromkeys(group)
     ]  # fmt: skip
@@ -203,10 +212,78 @@ def _edges_of(rooms: tuple[Any, ...]) -> Iterator[tuple[RoomEdge, tuple[int, int
             yield RoomEdge(rooms[k][a], rooms[m][b], (k, m)), (k, a), (m, b)
 
 
-def _crossings(edge: RoomEdge, places: list[Vec]) -> Iterator[Vec]:
+def _places_on(edge: RoomEdge, places: list[Vec], slack: float) -> list[Vec]:
+    """The places of an edge next to some places."""
+    walls = edge.one, edge.other
     with np.errstate(all="ignore"):
-        for place in places:
-            yield crossing(edge.one, edge.other, place, math.inf)
+        found = [crossing(*walls, place, math.inf) for place in places]
+        return [x for x in found if _is_on(walls, x, slack)]
+
+
+def _starts_along(edge: RoomEdge, on_it: list[Vec], extent: float) -> list[Vec]:
+    """Places on an edge, and far from these both ways along it."""
+    return [x + way * along for x in on_it for along in [_along(edge, x)] for way in (0.0, extent, -extent)]
+
+
+def _are_one(edge: RoomEdge, rooms: tuple[Any, ...], places: list[Vec], slack: float) -> bool:
+    """Whether walls of two rooms are in one place, or go on smoothly from one to the other.
+
+    Then a ball that both touch is at one place of them, and has one contact. Walls in one place are that at any; those
+    that go on smoothly, as a tube and its round end, do so where a third wall of either room ends one of them.
+    """
+    one, other = edge.one, edge.other
+    with np.errstate(all="ignore"):
+        if any(_go_on(one, other, _foot_on(one, place), slack) for place in places):
+            return True
+        ends = (
+            crossing(wall, third, place, math.inf)
+            for k, wall in zip(edge.rooms, (one, other), strict=True)
+            for third in rooms[k] if third is not wall
+            for place in places
+        )  # fmt: skip
+        return any(_go_on(one, other, x, slack) and is_seen(rooms, edge.rooms, x, slack) for x in ends)
+
+
+def _foot_on(wall: Any, x: Vec) -> Vec:
+    for _sweep in range(_PROJECTIONS):
+        x = x - wall.distance(x) * outward(wall, x)
+    return x
+
+
+def _go_on(one: Any, other: Any, x: Vec, slack: float) -> bool:
+    """Whether a place is on two walls with one normal there."""
+    return _is_on((one, other), x, slack) and bool(dot(outward(one, x), outward(other, x)) > 1.0 - _SMOOTH)
+
+
+def _corners_of(
+    faces: list[RoomFace],
+    group: list[int],
+    edges: list[RoomEdge],
+    rooms: tuple[Any, ...],
+    bounds: list[Any],
+    extent: float,
+) -> Iterator[tuple[int, RoomCorner]]:
+    """Where faces of one room join that are of one wall: each (the number of a face, the corner)."""
+    slack = _SLACK * extent
+    for i, j in itertools.combinations(range(len(faces)), 2):
+        (k, _k), wall, mate = faces[i].rooms, faces[i].wall, faces[j].wall
+        if group[i] != group[j] or faces[j].rooms[0] != k:
+            continue
+        line = RoomEdge(wall, mate, (k, k))
+        places = _places_on(line, _places_in((bounds[k],), extent, slack), slack)
+        starts = _starts_along(line, places, extent)
+        ends: list[Vec] = []
+        for m, room in enumerate(rooms):
+            found = () if m == k else _ends_at(line, room, starts, slack)
+            for _walls, x in found:
+                if is_seen(rooms, (k, m), x, slack) and all(norm(x - y) > slack for y in ends):
+                    ends.append(Vec(*map(float, x)))
+        if ends or any(is_seen(rooms, line.rooms, x, slack) for x in places):
+            sides = (
+                RoomSide(face, tuple(e for e in edges if face.wall is e.one or face.wall is e.other))
+                for face in (faces[i], faces[j])
+            )
+            yield i, RoomCorner(line, *sides, tuple(ends))
 
 
 def _is_on(walls: tuple[Any, ...], x: Vec, slack: float) -> bool:
