@@ -22,10 +22,10 @@ its foot may be seen. A hidden edge is not met before its foot may be seen or is
 import math
 from typing import Any
 
-from ...kernel.jit import outlined, select
+from ...kernel.jit import kernel, outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.record import Record
-from ...kernel.vector import ZERO, Vec, absolute, cross, dot, either, norm, square, total
+from ...kernel.vector import ZERO, Vec, absolute, column, cross, dot, either, norm, square, total
 from ..contract import Bent, Smooth
 from ..shapes.plane import PlaneNumbers
 from ..shapes.slab import SlabNumbers
@@ -63,6 +63,9 @@ class RoomEdge(Record):
         n, m = outward(self.one, x), outward(self.other, x)
         along = cross(n, m)
         sine2 = square(along)
+        if not sine2 > 0.0:
+            # Where walls touch they have no edge.
+            return math.inf
         along = along * (1.0 / math.sqrt(sine2))
         a, b = (wall.outward_acceleration(x, along, ZERO) for wall in (self.one, self.other))
         bend2 = (a * a + b * b - 2.0 * dot(n, m) * a * b) / sine2
@@ -150,6 +153,21 @@ class JoinedFaces(Smooth):
 
     def moving_step(self, seen, longest):
         return _moving_step(self, seen, longest)
+
+
+@kernel
+def touched(walls, points, radius, found):
+    """How far balls at points (3, N) with their radii (N,) reach beyond any of the walls, into `found`."""
+    for i in range(points.shape[1]):
+        found[i] = deepest_in(walls, column(points, 0, i), radius[i])
+
+
+def deepest_in(walls, r, radius):
+    """How far a ball reaches beyond any of the walls."""
+    deepest = -math.inf
+    for wall in walls:
+        deepest = max(deepest, wall.grown(radius).distance(r))
+    return deepest
 
 
 @outlined

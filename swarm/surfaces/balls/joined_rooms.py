@@ -20,7 +20,19 @@ from ..shapes.slab import Slab
 from ..shapes.sphere import Sphere
 from ..surface import Box as Bounds
 from ..surface import Surface
-from .joined_faces import FLAT, JoinedFaces, RoomCorner, RoomEdge, RoomFace, RoomSide, crossing, is_seen, outward
+from .joined_faces import (
+    FLAT,
+    JoinedFaces,
+    RoomCorner,
+    RoomEdge,
+    RoomFace,
+    RoomSide,
+    crossing,
+    deepest_in,
+    is_seen,
+    outward,
+    touched,
+)
 from .tip import TipPlane
 
 # Parts of the extent: the round-off of a place, and a distance that is larger than any other.
@@ -40,6 +52,8 @@ _BESIDE = 1e5
 _SWEEPS, _STILL, _PARALLEL = 30, 4.0 * EPSILON, 1e-9
 # Of normals of walls that go on smoothly, the most that their cosine is below 1; steps onto a wall.
 _SMOOTH, _PROJECTIONS = 1e-9, 4
+# Of no more balls it is asked in Python how far they reach outside: a kernel takes longer to compile.
+_FEW = 100
 # What all parts of a union that balls meet must have in common.
 _LAWS = "restitution", "friction", "temperature", "accommodation", "laws"
 _CHANGES = "motion", "openings", "present", "mass", "inertia"
@@ -93,11 +107,16 @@ class JoinedRooms(Surface):
         points = np.array(self._own_rows(points, time))
         gaps = [[one.reaching_outside(points, 0.0 * radius) for one in room] for room in self.rooms_of]
         outside = np.min([np.max(some, axis=0) for some in gaps], axis=0)
-        found = np.array(outside)
-        for i in np.flatnonzero(outside <= 0.0):
-            at, size = Vec(*points[:, i].tolist()), float(radius[i])
-            found[i] = max(wall.grown(size).phi(at) for wall in self.walls())
-        return np.where(outside > 0.0, outside + radius, found)
+        found, inside = outside + radius, outside <= 0.0
+        count, walls = int(inside.sum()), self.walls()
+        if count > _FEW:
+            beyond = np.empty(count)
+            touched(walls, np.ascontiguousarray(points[:, inside]), radius[inside].astype(np.float64), beyond)
+            found[inside] = beyond
+        else:
+            for i in np.flatnonzero(inside).tolist():
+                found[i] = deepest_in(walls, Vec(*points[:, i].tolist()), float(radius[i]))
+        return np.asarray(found)
 
 
 def joined_rooms_of(union: Any) -> JoinedRooms:
