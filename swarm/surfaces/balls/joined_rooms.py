@@ -362,13 +362,14 @@ def _is_seen_at(edge: RoomEdge, rooms: tuple[Any, ...], x: Vec, slack: float) ->
 
 
 def _ends_at(edge: RoomEdge, room: Any, starts: list[Vec], slack: float) -> Iterator[tuple[tuple[Any, ...], Vec]]:
-    """Where an edge meets other walls of a room: (the three walls, the place), as often as it is found."""
+    """Where an edge meets other walls of a room: (the three walls, the place), each once."""
     for wall in room:
-        walls = edge.one, edge.other, wall
+        walls, known = (edge.one, edge.other, wall), list[Vec]()
         if wall is not edge.one and wall is not edge.other:
             for start in starts:
                 x = _meeting(walls, start)
-                if _is_on(walls, x, slack):
+                if _is_on(walls, x, slack) and all(norm(x - y) > slack for y in known):
+                    known.append(x)
                     yield walls, x
 
 
