@@ -4,7 +4,7 @@ import math
 
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
-from ..kernel.vector import dot, square
+from ..kernel.vector import ZERO, dot, square
 from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field
 from .contacts import (
@@ -62,6 +62,11 @@ def rising(wall, r0, q0, move):
     return Closing(-slope * gradient, slope * risen)
 
 
+def velocity_at_end(wall, r1):
+    """That of a wall at a point at the end of a step."""
+    return wall._replace(pose=wall.end).velocity(r1) if isinstance(wall, Posed) else ZERO
+
+
 @outlined
 def gather_at_wall(matter, law, wall, grains, near, touches, given):
     """Add the balls that are in a wall at an end of the step to its contacts; how many are new."""
@@ -99,7 +104,8 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
             if law.damping is not None:
                 rows[c, DAMPING] = law.damping / math.sqrt(place[i, LIGHTNESS]) / matter.h
             way = rising(own, r0, q0, move)
-            speeds = size_of(vector_at(speed, i, AFTER))
+            v, carried = vector_at(speed, i, AFTER), velocity_at_end(own, r0 + move)
+            speeds = size_of(v - carried), size_of(v) + size_of(carried)
             first = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
             rows[c, PUSH], rows[c, GAIN] = begin_solve(first, half * place[i, LIGHTNESS] * square(way.along))
             rows[c, SCALE] = scale_of(matter, rows[c, PUSH], speeds, place[i, LIGHTNESS])

@@ -37,6 +37,9 @@ from .grain_arrays import (
 )
 
 _TINY = 1e-300
+# No less than this part of the velocities counts as what moves at a contact: round-off of them is then 1e-10 of it, and
+# sweeps end that gain no more, `_NEARLY` of step.py.
+_BELOW_ROUND_OFF = 2e-6
 # Where a damper acts, a change of an impulse counts so much less: what it takes is booked by what it did.
 _DAMPED = 1e-6
 # The margin is so many times what the step before would have needed, and is relied on up to that part of it: round-off
@@ -139,10 +142,14 @@ def begin_solve(pressed_first, ease):
 def scale_of(matter, push, speeds, ease):
     """What makes the magnitude of a change of an impulse one relative to what moves there, and what weight does.
 
-    `push` and `speeds`, the sum of the magnitudes of the velocities, are those with which the solution begins.
+    With what the solution begins: the size of the impulse, and `speeds`, the magnitude of the relative velocity and the
+    sum of those of both. What counts is the former, by which balls that are carried along are solved as at rest; less
+    than round-off of the latter is not asked for.
     """
     fall = 0.0 if matter.pull is None else matter.h * size_of(matter.pull)
-    return ease / (push * ease + (speeds + fall) + _TINY)
+    relative, whole = speeds
+    moving, least = push * ease + (relative + fall), _BELOW_ROUND_OFF * whole + _TINY
+    return ease / select(moving > least, moving, least)
 
 
 def changed(old, new, share):

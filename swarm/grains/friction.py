@@ -18,7 +18,7 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined, select
 from ..kernel.vector import ZERO, cross, dot, square
 from ..surfaces.in_motion.posed import Posed
-from .at_walls import press_at_wall, rising
+from .at_walls import press_at_wall, rising, velocity_at_end
 from .contacts import change_of, is_due, size_of, stir, worse
 from .grain_arrays import (
     AFTER,
@@ -67,10 +67,8 @@ def arm_of(way, size, change, nearness):
 
 def _carried(wall, r0, r1):
     """Twice the mean velocity of a wall's surface over a step, and that at its end."""
-    if not isinstance(wall, Posed):
-        return ZERO, ZERO
-    last = wall._replace(pose=wall.end).velocity(r1)
-    return wall.velocity(r0) + last, last
+    last = velocity_at_end(wall, r1)
+    return (wall.velocity(r0) if isinstance(wall, Posed) else ZERO) + last, last
 
 
 def _facing(own, way, radius, r0, move):

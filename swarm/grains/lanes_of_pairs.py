@@ -208,7 +208,7 @@ def _begin_contact(matter, rows, q, lane, read):
     way = closing(s0, size, move)
     push, gain = begin_solve(pressed(matter, damping, gap, way.change), half * ease)
     rows[q + PUSH, lane], rows[q + GAIN, lane] = push, gain
-    rows[q + SCALE, lane] = scale_of(matter, push, size_of(v1) + size_of(u1), ease)
+    rows[q + SCALE, lane] = scale_of(matter, push, (size_of(v1 - u1), size_of(v1) + size_of(u1)), ease)
     impulse = push * way.along
     set_vector_in(rows, q + IMPULSE, lane, impulse)
     if matter.pairs.friction is not None:

@@ -374,9 +374,9 @@ def test_balls_meet_across_the_faces_of_a_cell():
         ran(scene, start, SOFT, 0.01)
 
 
-def heap(of_walls, of_pairs):
+def heap(of_walls, of_pairs, **moved):
     """Eight balls that are about to fall on the floor of a box, with friction."""
-    box = swarm.Box((0.0106, 0.0106, 0.1), (0.0, 0.0, 0.1), restitution=0.3, friction=of_walls)
+    box = swarm.Box((0.0106, 0.0106, 0.1), (0.0, 0.0, 0.1), restitution=0.3, friction=of_walls, **moved)
     scene = swarm.Scene([box], gravity=(0.0, 0.0, -9.81), pairs=swarm.Pairs(restitution=0.3, friction=of_pairs))
     k, wobble = np.arange(8), np.random.default_rng(0).uniform(-1.5e-4, 1.5e-4, (3, 8))
     places = 0.0103 * np.array([k % 2 - 0.5, k // 2 % 2 - 0.5, k // 4 + 0.55]) + wobble
@@ -400,6 +400,34 @@ def test_overlaps_where_dampers_act_are_those_of_sweeps_to_round_off(friction, o
     monkeypatch.setattr(contacts, "_DAMPED", 1.0)
     assert found.max() > 5e-5
     np.testing.assert_allclose(found, overlaps(), rtol=0.0, atol=off * 0.005)
+
+
+def test_a_heap_that_is_carried_along_comes_to_rest_as_one_at_rest():
+    """Galilei: what friction leaves of a slip follows from relative velocities."""
+    carried, until = np.array([[12.0], [-10.0], [4.0]]), 0.02
+    (scene, start), moving = heap(0.5, 0.5), heap(0.5, 0.5, motion=swarm.Translation(carried.ravel()))[0]
+    thrown_along = swarm.Particles(start.position, start.velocity + carried, start.mass, radius=start.radius)
+    here, there = (
+        ran(one, balls, swarm.Penalty(2e-4, 1600.0, 1.0), until).particles
+        for one, balls in ((scene, start), (moving, thrown_along))
+    )
+    assert np.abs(here.spin).max() > 0.1
+    np.testing.assert_allclose(there.velocity - carried, here.velocity, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(there.position - carried * until, here.position, rtol=0.0, atol=1e-13)
+
+
+def test_round_off_of_fast_balls_that_rest_on_one_another_is_not_solved():
+    """Three that touch and fly together: what they have of relative velocities are last bits."""
+    x = np.array([0.0, 1.0, 2.0]) * (2.0 * RADIUS - 1e-12)
+    start = swarm.Particles(
+        [x, [0.2] * 3, [0.1] * 3], np.tile([[300.0], [200.0], [-50.0]], (1, 3)), MASS, radius=RADIUS
+    )
+    with GrainsRun(
+        swarm.Scene([ROOM]).compiled(), start, swarm.Penalty(1e-4, 1e4), 1, None, "never", Seeding(), Watched()
+    ) as run:
+        run.observe()
+        assert run.advance(20.0, 0.002)
+        assert int(run._world.books.sweeps[0]) < 3 * 20
 
 
 @pytest.mark.parametrize(("of_walls", "of_pairs"), [(0.5, 0.0), (0.0, 0.5)], ids=["walls", "pairs"])

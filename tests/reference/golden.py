@@ -46,6 +46,8 @@ polynomial of degree 8, its first root a guess and a proof: hits to round-off, 8
 Two cells of balls in a union were written again when flights took longer steps and no bisection of round-off: 4e-16 at
 their ends; and again when corners that two rooms have in common were no edges any more; and again when walls that two
 rooms have in one place became one wall: the same ends by the bits, and a number fewer for each of these walls.
+Seven cells of grains were written again when changes of impulses became relative to how fast two meet, not to how fast
+both go: 2e-12 at the ends that are here, for sweeps end one later.
 
 The runs "cell: ..." are those of cells of `bench.cells` that work, one kind of wall for each engine and capability, and
 their digests are of the final state, the observables and the datasets of the trajectory, but for dates, versions,
