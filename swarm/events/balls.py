@@ -40,7 +40,8 @@ def require_balls(scene: Scene, particles: Particles, method: Method) -> None:
 
 
 def _may_turn(scene: Scene, method: Method) -> bool:
-    rough_walls = not method.is_rigid() and any(one.friction for one in scene.surfaces)
+    parts = (one for whole in scene.surfaces for one in (whole, *whole.surfaces()))
+    rough_walls = not method.is_rigid() and any(one.friction for one in parts)
     return rough_walls or (scene.pairs is not None and scene.pairs.friction > 0.0)
 
 

@@ -12,6 +12,7 @@ from ..kernel.arrays import index, scratch
 from ..kernel.grid import wrapped
 from ..kernel.jit import Array, long_kernel, outlined
 from ..kernel.vector import square
+from ..surfaces.balls.joined_faces import JoinedFaces
 from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field
 from .cell import nearest
@@ -127,14 +128,18 @@ def _list_cells(period, grains, near, given, some, way, found):
     return _list_between(period, grains, near, (begin, end, skin), index(a), found)
 
 
+def _depth(wall, r):
+    """How deep a ball is in a wall, to first order, which may be off by half of itself; of faces that end, at most."""
+    return -wall.clearance(r) if isinstance(wall, JoinedFaces) else wall.distance(r)
+
+
 @outlined
 def _list_at_wall(wall, grains, near, skin, found):
     """List the balls near a wall, of one that moves all; how many are listed then."""
     place, always = grains.place, isinstance(wall, Posed)
     for k in range(place.shape[0]):
         i = index(k)
-        # A distance to first order, which may be off by half of itself.
-        if always or wall.grown(place[i, RADIUS]).distance(vector_at(place, i, X)) > -2.0 * skin:
+        if always or _depth(wall.grown(place[i, RADIUS]), vector_at(place, i, X)) > -2.0 * skin:
             if found < near.slot.size:
                 near.slot[index(found)] = k
                 if near.spans is not None:

@@ -176,6 +176,31 @@ def test_losses_given_to_parts_are_those_given_to_the_whole(kind):
         ends.append(swarm.simulate(scene, ball, swarm.Penalty(dt=5e-5, penalty=1e5), until=0.05))
     assert ends[0].observables["dissipated_energy"][-1] > 0.02
     assert ends[1].particles.velocity.tolist() == ends[0].particles.velocity.tolist()
+    assert ends[1].particles.spin.tolist() == ends[0].particles.spin.tolist()
+    assert ends[0].particles.spin[1, 0] > 0.1
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.05, -0.05, 1e-4])
+@pytest.mark.parametrize("below", [0.0, 1e-5, 1e-7, -1e-5])
+def test_where_two_rooms_meet_a_wall_goes_on(below, rise):
+    """A ball that flies into the side of two boxes, one on the other, beside their seam: as into that of one box."""
+    side, seam, ends = 0.016, 0.015, []
+    for vessel in (
+        swarm.Box((side, side, 0.04), (0.0, 0.0, 0.04)),
+        swarm.Union(
+            [
+                swarm.Box((side, side, 0.5 * seam), (0.0, 0.0, 0.5 * seam)),
+                swarm.Box((side, side, 0.5 * (0.08 - seam)), (0.0, 0.0, 0.5 * (0.08 + seam))),
+            ]
+        ),
+    ):
+        ball = swarm.Particles((0.0109, 0.001, seam - below), (0.3, 0.0, rise), mass=1.3e-3, radius=0.005)
+        method = swarm.Penalty(1e-4, 4e3)
+        ends.append(swarm.simulate(swarm.Scene([vessel]), ball, method, until=0.003, every=0.003, compile="never"))
+    one, two = (end.particles for end in ends)
+    assert one.velocity[0, 0] == pytest.approx(-0.3, rel=1e-9)
+    np.testing.assert_allclose(two.position, one.position, rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(two.velocity, one.velocity, rtol=0.0, atol=1e-11)
 
 
 def test_a_lid_closes_each_room_of_a_union():

@@ -265,14 +265,19 @@ def at_least(wall, r):
     """A lower bound of the distance to the nearest place, also from afar, where `nearest` leaves edges out."""
     best = wall.most
     for face in wall.faces:
-        away = face.wall.distance(r)
-        seen = is_seen(wall.rooms, face.rooms, r - away * outward(face.wall, r), wall.slack)
-        best = select(seen, min(abs(away), best), best)
+        best = min(best, _at_least_to(wall, face, r))
     for edge in wall.edges:
         best = min(best, max(abs(edge.one.distance(r)), abs(edge.other.distance(r))))
     for tip in wall.tips:
         best = min(best, norm(tip - r))
     return best
+
+
+def _at_least_to(wall, face, r):
+    """The same of a face: where its foot is hidden, of what is seen beside it, which may have no edge there."""
+    away, n, flat = face.wall.distance(r), outward(face.wall, r), isinstance(face.wall, FLAT)
+    depth = max(hidden(wall.rooms, face.rooms, r - away * n, n if flat else ZERO), 0.0)
+    return math.sqrt(away * away + depth * depth) if flat else max(abs(away), depth - abs(away))
 
 
 def outward(wall, r):
