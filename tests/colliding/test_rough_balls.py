@@ -84,6 +84,24 @@ def test_a_ball_that_does_not_turn_leaves_a_rough_floor_with_five_sevenths_of_it
     assert after.spin[:, 0] == pytest.approx([-vy / 0.1, vx / 0.1, 3.0], rel=1e-13)
 
 
+@pytest.mark.parametrize("belt", [0.0, 0.5], ids=["at rest", "that moves"])
+@pytest.mark.parametrize("spin", [True, False], ids=["turning", "without spin"])
+def test_a_ball_that_lies_on_a_slope_has_the_friction_of_its_weight(spin, belt):
+    """a = g (sin A - mu cos A) where it slips, with any restitution: a lasting contact is many impacts of the floor."""
+    g, angle, mu, radius = 9.81, 0.7, 0.1, 0.02
+    floor = swarm.Plane((0.0, 0.0, -1.0), friction=mu, restitution=0.1, motion=swarm.Translation((belt, 0.0, 0.0)))
+    tilted = swarm.Scene([floor], gravity=(g * np.sin(angle), 0.0, -g * np.cos(angle)))
+    ball = swarm.Particles([0.0, 0.0, radius], [belt, 0.0, 0.0], 0.1, radius=radius, spin=[0.0] * 3 if spin else None)
+    done = swarm.simulate(tilted, ball, swarm.Impact(), until=0.05, compile="never", progress=False)
+    grip = mu * g * np.cos(angle) * 0.05
+    assert belt + g * np.sin(angle) * 0.05 - done.particles.velocity[0, 0] == pytest.approx(grip, rel=1e-3)
+    if spin:
+        assert done.particles.spin[1, 0] == pytest.approx(2.5 * grip / radius, rel=1e-3)
+    seen = done.observables
+    balance = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_work"][:, 0]
+    assert balance[-1] == pytest.approx(balance[0], abs=1e-14)
+
+
 def test_momentum_and_angular_momentum_of_a_cloud_are_conserved():
     _scene, balls = gas(24)
     balls.velocity -= 2.0 * balls.position

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...common.status import Status
-from ...contact.reflection import given, relative, wall_velocity
+from ...contact.reflection import from_relative, given, relative, rub, wall_velocity
 from ...contact.wall_impact import Arriving, book, impact_on_wall
 from ...kernel.arrays import index
 from ...kernel.gravity import accelerated, potential
@@ -121,9 +121,14 @@ def _turned(box, flock, books, walls, wall, ball):
     # The energy decides the speed: the square of a velocity has a bias.
     v1 = either(turned.keeps, with_square(turned.v, turned.twice_energy - fall), turned.v)
     turned = turned._replace(v=v1)
-    if box.turning is not None and box.laws.friction is not None and not turned.is_sent:
-        turned = rub_wall(box.laws, walls, wall, box.turning, (i, box.kinds.radius_of(i), r), turned)
-    return _lifted(box, walls, wall, r, turned)
+    lifted = _lifted(box, walls, wall, r, turned)
+    # Friction takes of the whole normal impulse, with that of a contact that lasts.
+    if box.laws.friction is not None and not turned.is_sent:
+        if box.turning is not None:
+            return rub_wall(box.laws, walls, wall, box.turning, (i, box.kinds.radius_of(i), r), lifted)
+        if lifted.impulse > turned.impulse:
+            return _rubbed(box.laws, walls, wall, r, lifted, lifted.impulse - turned.impulse)
+    return lifted
 
 
 @outlined
@@ -154,6 +159,18 @@ def _lifted(box, walls, wall, r, turned):
             twice_energy=turned.twice_energy + gained + work,
         )  # fmt: skip
     return turned
+
+
+def _rubbed(laws, walls, wall, r, bounce, impulse):
+    """The `Bounce` of a ball that does not turn, with the friction of a further normal impulse."""
+    n, u = walls.unit_normal(wall, r), wall_velocity(laws.moving, walls, wall, r)
+    w = relative(u, bounce.v)
+    rubbed, taken = rub(laws, wall, n, w, impulse)
+    work = given(u, rubbed - w)
+    return bounce._replace(
+        v=from_relative(u, rubbed), twice_energy=bounce.twice_energy - taken + work, work=bounce.work + work,
+        lost=bounce.lost + taken,
+    )  # fmt: skip
 
 
 @outlined
