@@ -45,6 +45,33 @@ def test_a_rate_and_a_pressure_are_of_the_frame_before():
     assert numbers.seen(state)["pressure"] == pytest.approx(2.0 * (10.0 - 2.5) / 6.0, rel=1e-15)
 
 
+@pytest.mark.parametrize("way", ["escape_time", "absorbed_time"])
+def test_balls_that_have_left_press_no_more(way):
+    numbers, balls = of(4)
+    left = np.full(4, np.nan)
+    velocity = np.zeros((3, 4))
+    velocity[0] = 1.0, 2.0, 3.0, 4.0
+    state = state_of(balls)._replace(velocity=velocity, **{way: left})
+    numbers.frame(state, 0.0, 15.0)
+    left[2] = 0.5
+    numbers.frame(state, 1.0, 15.0)
+    # By the trapezoidal rule of 15 J and of 10.5 J.
+    assert numbers.seen(state)["pressure"] == pytest.approx(2.0 * 12.75 / 6.0, rel=1e-15)
+    left[:2] = 1.5
+    numbers.frame(state, 2.0, 15.0)
+    assert numbers.seen(state)["pressure"] == pytest.approx(2.0 * 9.25 / 6.0, rel=1e-15)
+
+
+@pytest.mark.parametrize("law", [{"openings": [swarm.Sphere(2.0)]}, {"laws": [swarm.Absorb(1.0)]}], ids=["out", "in"])
+@pytest.mark.parametrize("method", [swarm.Impact(), swarm.Penalty(dt=2e-3, penalty=1e5)], ids=["hard", "soft"])
+def test_a_vessel_that_all_balls_have_left_has_no_pressure(law, method):
+    vessel = swarm.Scene([swarm.Box((0.5, 0.5, 0.5), **law)])
+    start = swarm.fill(vessel, 3, speed=1.0, radius=0.02, seed=1)
+    seen = swarm.simulate(vessel, start, method, until=4.0, every=2.0, compile="never", progress=False).observables
+    assert seen["pressure"][1] > 0.0
+    assert seen["pressure"][2] == 0.0
+
+
 def test_a_run_that_goes_on_has_the_same():
     numbers, balls = of(2)
     numbers.frame(state_of(balls), 0.0, 1.0)
