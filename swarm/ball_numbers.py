@@ -82,15 +82,15 @@ class BallNumbers:
         Args:
             state: at the frame.
             moment: of the frame [s]; 0 is the start.
-            kinetic: energy of the translation of all balls at the frame [J].
-            action: the integral of that of the balls inside since the start [J s]; None: by the trapezoidal rule over
-                frames, which is exact where it does not change.
+            kinetic: energy of the translation at the frame, of the balls that move: what others keep presses on nothing
+                [J].
+            action: its integral since the start [J s]; None: by the trapezoidal rule over frames, which is exact where
+                it does not change.
         """
         balls = state.balls
         assert balls is not None
         last = dict(zip(_LAST, self._last.tolist(), strict=True))
         collisions, virial = _collisions(state), float(balls.virial[0])
-        kinetic -= _kinetic_of_gone(state)
         span = moment - last["time"]
         rate = pressure = math.nan
         if moment > 0.0:
@@ -121,14 +121,6 @@ class BallNumbers:
             **seen, **mine, "total_energy": seen["total_energy"] + mine["rotational_energy"],
             "angular_momentum": seen["angular_momentum"] + turning,
         }  # fmt: skip
-
-
-def _kinetic_of_gone(state: State) -> float:
-    """The kinetic energy that balls keep which have left the volume, and press on nothing [J]."""
-    gone = state.gone()
-    if not gone.any():
-        return 0.0
-    return float(0.5 * (state.mass[gone] * (state.velocity[:, gone] ** 2).sum(axis=0)).sum())
 
 
 def _collisions(state: State) -> int:

@@ -45,26 +45,14 @@ def test_a_rate_and_a_pressure_are_of_the_frame_before():
     assert numbers.seen(state)["pressure"] == pytest.approx(2.0 * (10.0 - 2.5) / 6.0, rel=1e-15)
 
 
-@pytest.mark.parametrize("way", ["escape_time", "absorbed_time"])
-def test_balls_that_have_left_press_no_more(way):
-    numbers, balls = of(4)
-    left = np.full(4, np.nan)
-    velocity = np.zeros((3, 4))
-    velocity[0] = 1.0, 2.0, 3.0, 4.0
-    state = state_of(balls)._replace(velocity=velocity, **{way: left})
-    numbers.frame(state, 0.0, 15.0)
-    left[2] = 0.5
-    numbers.frame(state, 1.0, 15.0)
-    # By the trapezoidal rule of 15 J and of 10.5 J.
-    assert numbers.seen(state)["pressure"] == pytest.approx(2.0 * 12.75 / 6.0, rel=1e-15)
-    left[:2] = 1.5
-    numbers.frame(state, 2.0, 15.0)
-    assert numbers.seen(state)["pressure"] == pytest.approx(2.0 * 9.25 / 6.0, rel=1e-15)
+ALL = {"left": {"openings": [swarm.Sphere(2.0)]}, "absorbed": {"laws": [swarm.Absorb(1.0)]},
+       "waiting": {"laws": [swarm.Sticky(1e6)]}}  # fmt: skip
 
 
-@pytest.mark.parametrize("law", [{"openings": [swarm.Sphere(2.0)]}, {"laws": [swarm.Absorb(1.0)]}], ids=["out", "in"])
+@pytest.mark.parametrize("law", ALL.values(), ids=list(ALL))
 @pytest.mark.parametrize("method", [swarm.Impact(), swarm.Penalty(dt=2e-3, penalty=1e5)], ids=["hard", "soft"])
-def test_a_vessel_that_all_balls_have_left_has_no_pressure(law, method):
+def test_balls_that_have_left_or_wait_have_no_pressure(law, method):
+    """All of them do after the time of a crossing; what they keep as their velocity presses on nothing."""
     vessel = swarm.Scene([swarm.Box((0.5, 0.5, 0.5), **law)])
     start = swarm.fill(vessel, 3, speed=1.0, radius=0.02, seed=1)
     seen = swarm.simulate(vessel, start, method, until=4.0, every=2.0, compile="never", progress=False).observables

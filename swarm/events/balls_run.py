@@ -29,6 +29,7 @@ from .colliding.bounce import Gates
 from .colliding.box import CollisionRule, CollisionTotals
 from .colliding.clock import CLOCK, COLLISIONS, EPOCHS, LENGTH, REACH
 from .colliding.described import come, described, reach_of, there_at
+from .colliding.next_collision import FIXED
 from .colliding.queue import FIRST
 from .colliding.resting import warn_of_rest
 from .colliding.rows import FACE, MET, WHOLES
@@ -247,6 +248,10 @@ class CollidingRun(BaseRun):
         self._look_anew(-1.0)
         if self._feed is not None and self._feed.next() <= 0.0:
             self._feed_in(0.0)
+
+    def _waiting(self) -> Any:
+        kinds = self._box.kinds
+        return kinds.mass == FIXED if self._flock.holds is not None else False
 
     def _scale_of(self, seen: dict[str, Any]) -> float:
         turning = seen.get("rotational_energy", 0.0)

@@ -432,6 +432,10 @@ class GrainsRun(BaseRun):
         self._stored, world.books.overlap[0] = stored, max(overlap, world.books.overlap[0])
         super()._observe(moment)
 
+    def _waiting(self) -> Any:
+        held = self._world.held
+        return False if held is None else ~np.isnan(held.until)
+
     def observe(self) -> None:
         super().observe()
         self._scale = self._scale_of(self._summary())

@@ -278,12 +278,22 @@ class BaseRun:
         self._tier.kernel(observables.observe)(*self._observing())
         # Rates are those of a frame, not of a piece of one.
         if self._ball_numbers is not None and moment == self._end:
-            self._ball_numbers.frame(self._seen_state(), moment, self._summed()["kinetic_energy"])
+            kinetic = self._summed()["kinetic_energy"] - self._kinetic_of(self.state.gone() | self._waiting())
+            self._ball_numbers.frame(self._seen_state(), moment, kinetic)
 
     def _observing(self, drawn: NDArray[Any] | None = None) -> tuple[Any, ...]:
         """Arguments of `observe`: of all chunks, or of the draws of a thread."""
         drawn = np.arange(len(self._partial)) if drawn is None else drawn
         return self._law, self._walls, self._gravity, self._seen_state(), drawn, self._size, self._partial
+
+    def _waiting(self) -> Any:
+        """(N,) whether a wall holds each ball: it does not move, and its velocity is that with which it will leave."""
+        return False
+
+    def _kinetic_of(self, some: NDArray[np.bool_]) -> float:
+        """The kinetic energy of some of the particles [J]."""
+        state = self.state
+        return 0.5 * float((state.mass[some] * (state.velocity[:, some] ** 2).sum(axis=0)).sum())
 
     def _summed(self) -> dict[str, Any]:
         """The observables that are sums over particles."""

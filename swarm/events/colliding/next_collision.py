@@ -24,7 +24,7 @@ from .window import OUT, UNKNOWN, next_hit
 # Cells around a ball, its own included, and how many balls of them are looked at at once.
 _CELLS, _MOST = 27, 128
 # The mass of a ball that a wall holds [kg]: that of two is then the other one's, to the last bit.
-_FIXED = 2.0**200
+FIXED = 2.0**200
 # So many parts a fall beside a ball that is held has at most, in each of which it surely meets it or not.
 _PARTS = 100
 # Of the cells around a ball: those beyond no face alone.
@@ -107,11 +107,11 @@ class Holdable(Various):
 
     def hold(self, i):
         """A wall holds it from now on."""
-        self.mass[index(i)] = _FIXED
+        self.mass[index(i)] = FIXED
 
     def is_held(self, i):
         """Whether a wall holds it."""
-        return self.mass[index(i)] == _FIXED
+        return self.mass[index(i)] == FIXED
 
 
 def between(grid, r, other):
