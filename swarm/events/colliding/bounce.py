@@ -140,8 +140,8 @@ def _lifted(box, walls, wall, r, turned):
     """
     u = wall_velocity(box.laws.moving, walls, wall, r)
     w, pull = relative(u, turned.v), accelerated(box.pull, ZERO, 1.0)
-    # Where the wall bends away within that flight, a part of its speed is enough.
-    most = max(_ENOUGH * norm(w), 0.5 * norm(pull) * box.shortest)
+    # Where the wall bends away within that flight, a part of its speed is enough; on one that turns, it may go with it.
+    most = max(_ENOUGH * max(norm(w), norm(turned.v)), 0.5 * norm(pull) * box.shortest)
     # Few leave so slowly that the wall is asked again.
     if 0.5 * turned.twice_away > _SURELY * max(most, _PARTS * norm(turned.v)):
         return turned
