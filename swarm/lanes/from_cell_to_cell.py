@@ -85,8 +85,8 @@ class UnderWay(Record):
         """That way, as `FlightInCell`."""
         raise NotImplementedError
 
-    def met(self, gravity, mesh, i, m):
-        """The `Hit` of a lane with a facet; without a wall how far it surely meets none, if that is less."""
+    def meet(self, gravity, mesh, maybe, some):
+        """Take the hits of lanes with so many facets that they may meet."""
         raise NotImplementedError
 
     # --- From step to step ---
@@ -97,6 +97,12 @@ class UnderWay(Record):
             self.rows[k, target] = self.rows[k, source]
         self.time[target], self.owner[target] = self.time[source], self.owner[source]
         self.last[target] = self.last[source]
+
+    def take(self, i, met):
+        """Take a `Hit` of a lane, or without a wall how far it surely meets none, if it is the first on its way."""
+        sooner = met.time < self.until[i]
+        self.until[i] = select(sooner, met.time, self.until[i])
+        self.wall[i] = select(sooner, met.wall, self.wall[i])
 
     def keep(self, course, i, time, wall):
         """Keep the hit of a lane, if it is the first so far."""
@@ -170,10 +176,12 @@ class UnderWayAtRest(UnderWay):
         at, pace = column(self.rows, MIDDLE, i), accelerated(gravity, v, time)
         return flight_in(mesh.grid, at, pace, gravity, self.until[i] - time)
 
-    def met(self, gravity, mesh, i, m):
+    def meet(self, gravity, mesh, maybe, some):
         """As of `UnderWay`."""
-        r, v = column(self.rows, START, i), column(self.rows, SPEED, i)
-        return hit_of(mesh, gravity, r, v, m)
+        for n in range(some):
+            i = index(maybe.lane[n])
+            r, v = column(self.rows, START, i), column(self.rows, SPEED, i)
+            self.take(i, hit_of(mesh, gravity, r, v, index(maybe.facet[n])))
 
 
 class Maybe(Record):
@@ -311,12 +319,7 @@ def _look_at(gravity, mesh, under, found, some):
     """So many lanes each at a facet."""
     looks, maybe = found
     maybe.look_up(under.facets(mesh), looks, some)
-    for n in range(some):
-        i = index(maybe.lane[n])
-        met = under.met(gravity, mesh, i, index(maybe.facet[n]))
-        sooner = met.time < under.until[i]
-        under.until[i] = select(sooner, met.time, under.until[i])
-        under.wall[i] = select(sooner, met.wall, under.wall[i])
+    under.meet(gravity, mesh, maybe, some)
 
 
 @outlined

@@ -8,10 +8,13 @@ to that facet alone lead to the hit: none is skipped.
 import math
 from typing import Any
 
-from ..kernel.arrays import index
+import numpy as np
+
+from ..kernel.arrays import index, unwritten
 from ..kernel.grid import cell_of, until_next, until_out
-from ..kernel.jit import outlined, select
+from ..kernel.jit import Array, outlined, select
 from ..kernel.limits import EPSILON
+from ..kernel.record import Record
 from ..kernel.vector import column, dot, norm, put
 from ..surfaces.facets.facet_cells import flight_in
 from ..surfaces.fields.members import member
@@ -20,6 +23,7 @@ from ..surfaces.time_of_impact.flights import Hit
 from ..surfaces.time_of_impact.march import lets_go
 from ..surfaces.time_of_impact.rising import InWallFrame, Level, ThirdDerivativeBound, flight_of
 from .from_cell_to_cell import MIDDLE, ROWS, SPEED, START, UnderWay, go_from_cell_to_cell, under_way
+from .table import LANES, STRIDE
 
 # More rows of a lane that is under way: of its flight at its start, and of where it is in the frame of the mesh.
 _REMAINING, _FAST = SPEED + 3, SPEED + 4
@@ -32,8 +36,11 @@ _CURVED = 1.5
 _LONGEST = 25.0
 # A part of the room of a facet, by which a flight goes on that comes to its plane just beyond an edge.
 _ON = 0.5
-# Where a step to a facet ends that does not lead to the hit.
-_NEARER, _BEYOND, _BEHIND = -1.0, -2.0, -3.0
+# Lanes take so many safe steps to facets side by side after the first, as most need no more.
+_TOGETHER = 4
+# Where a step to a facet leads: to the hit, nearer to it, to its plane beyond an edge, or to where it is not behind it;
+# past it in the time that counts, or where a lane takes its steps by itself.
+_TO_HIT, _NEARER, _BEYOND, _BEHIND, _PAST, _ALONE = 0.0, -1.0, -2.0, -3.0, -4.0, -5.0
 
 
 class UnderWayInMotion(UnderWay):
@@ -102,12 +109,10 @@ class UnderWayInMotion(UnderWay):
         at = column(self.rows, MIDDLE, i)
         return flight_in(mesh.body.grid, at, seen.v, seen.a, span, seen.bounds(span))
 
-    def met(self, gravity, mesh, i, m):
+    def meet(self, gravity, mesh, maybe, some):
         """As of `UnderWay`."""
-        facet, seen, until = member(mesh.body, m), self.seen(mesh, gravity, i), self.until[i]
-        if _misses(facet, seen, until - self.time[i]):
-            return Hit(math.inf, -1.0)
-        return _met(gravity, mesh, self, i, m)
+        for first in range(0, some, LANES):
+            _meet(gravity, mesh, self, maybe, index(first), min(int(some) - int(first), LANES))
 
 
 @outlined
@@ -116,12 +121,91 @@ def go_through_moving(gravity, mesh, before, lanes, live):
     go_from_cell_to_cell(under_way(UnderWayInMotion), gravity, mesh, before, lanes, live)
 
 
+# --- Facets ----------------------------------------------------------------------------------------------
+
+
 @outlined
-def _met(gravity, mesh, under, i, m):
-    """As `UnderWay.met`, in this step."""
-    facet, flight = member(mesh.body, index(m)), under.flight(gravity, i)
-    t, until, room = under.time[i], under.until[i], facet.room.value
-    seen = under.seen(mesh, gravity, i)
+def _meet(gravity, mesh, under, maybe, first, count):
+    """Take the hits with so many facets: those that a flight does not surely miss, by safe steps side by side."""
+    marked, near = unwritten(STRIDE, np.bool_), near_facets()
+    for n in range(index(count)):
+        i, facet = index(maybe.lane[first + n]), member(mesh.body, index(maybe.facet[first + n]))
+        marked[n] = not _misses(facet, under.seen(mesh, gravity, i), under.until[i] - under.time[i])
+    left = index(0)
+    for n in range(index(count)):
+        near.lane[left], near.facet[left] = maybe.lane[first + n], maybe.facet[first + n]
+        left += index(marked[n])
+    for k in range(left):
+        near.time[k] = under.time[index(near.lane[k])]
+    for k in range(left):
+        near.approach(gravity, mesh, under, k, True)
+    left = near.close_up(gravity, mesh, under, left)
+    for _round in range(_TOGETHER):
+        for k in range(left):
+            near.approach(gravity, mesh, under, k, False)
+        left = near.close_up(gravity, mesh, under, left)
+    for k in range(left):
+        near.go_alone(gravity, mesh, under, k)
+
+
+class NearFacets(Record):
+    """Lanes, each on its way to a facet by safe steps."""
+
+    lane: Array  # int64
+    facet: Array  # int64
+    time: Array  # how far it has come
+    step: Array  # the next safe step
+    leads: Array  # where that leads, one of _TO_HIT, _NEARER, _PAST and _ALONE
+
+    def approach(self, gravity, mesh, under, k, is_first):
+        """The next step, without a branch; at the start a lane is seen already."""
+        i, facet, t = index(self.lane[k]), member(mesh.body, index(self.facet[k])), self.time[k]
+        seen = under.seen(mesh, gravity, i) if is_first else mesh.seen(under.flight(gravity, i), t)
+        self.step[k], self.leads[k] = _approach(facet, seen, t, under.until[i])
+
+    def close_up(self, gravity, mesh, under, left):
+        """Take the hits of those that are there; how many are on their way still."""
+        kept = index(0)
+        for k in range(left):
+            leads = self.leads[k]
+            if leads == _TO_HIT:
+                self.arrive(gravity, mesh, under, k)
+            elif leads == _ALONE:
+                self.go_alone(gravity, mesh, under, k)
+            self.lane[kept], self.facet[kept] = self.lane[k], self.facet[k]
+            self.time[kept] = self.time[k] + self.step[k]
+            kept += index(leads == _NEARER)
+        return kept
+
+    def arrive(self, gravity, mesh, under, k):
+        """Take a hit, unless the facet gives way there to one that is turned the other way."""
+        i, t, step = index(self.lane[k]), self.time[k], self.step[k]
+        # As at rest: flights from one of two such facets to the other one take no time.
+        short = (t + step) * under.seen(mesh, gravity, i).bounds(0.0).speed <= mesh.body.like.room.value
+        if short:
+            self.go_alone(gravity, mesh, under, k)
+        else:
+            under.take(i, Hit(t + step, float(self.facet[k])))
+
+    def go_alone(self, gravity, mesh, under, k):
+        """Take the hit of a lane that goes on by itself."""
+        i = index(self.lane[k])
+        under.take(i, _met(gravity, mesh, (under.flight(gravity, i), self.time[k], under.until[i]), self.facet[k]))
+
+
+def near_facets():
+    """Room for those of as many lanes as are looked at together."""
+    return NearFacets(
+        unwritten(STRIDE, np.int64), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
+        unwritten(STRIDE, np.float64), unwritten(STRIDE, np.float64),
+    )  # fmt: skip
+
+
+@outlined
+def _met(gravity, mesh, way, m):
+    """The first `Hit` of a flight that has come so far with a facet, until a time, by one step after the other."""
+    facet, (flight, t, until) = member(mesh.body, index(m)), way
+    room, seen = facet.room.value, mesh.seen(flight, t)
     for _k in range(_STEPS):
         step = _step_to(facet, seen, until - t)
         if not step.time < until - t:
@@ -137,8 +221,28 @@ def _met(gravity, mesh, under, i, m):
     return Hit(t, -1.0)
 
 
+def _approach(facet, seen, t, until):
+    """The step of `_step_to` at a time without a branch, and where it leads: some lanes go on alone from there."""
+    depth, rate, bend = facet.phi(seen.r), 0.5 * dot(facet.normal, seen.v), 0.5 * dot(facet.normal, seen.a)
+    longest, room = until - t, 2.0 * EPSILON * seen.coordinates
+    ahead = 2.0 * rise_time(depth, rate, bend)
+    ahead = select(ahead < longest, ahead, longest)
+    bounds = seen.bounds(ahead)
+    sixth = bounds.jerk * (1.0 / 6.0)
+    time = rise_time(depth, rate, bend + sixth * ahead)
+    time = select(time < ahead, time, ahead)
+    is_sure = 2.0 * sixth * ahead * time * time <= room
+    is_near, is_there = is_sure | (time * bounds.speed <= room), not facet.is_beyond(_place(seen, time), 0.0)
+    was_there = not facet.is_beyond(seen.r, 0.0)
+    hits = (is_sure & is_there) | (was_there & (time * bounds.speed <= room)) | (not t + time > t)
+    alone = (depth > facet.room.value) | lets_go(depth, rate, time, room) | (is_near & (not hits))
+    leads = select(hits, _TO_HIT, select(time < longest, _NEARER, _PAST))
+    return time, select(alone, _ALONE, select(time < longest, leads, _PAST))
+
+
+
 def _step_to(facet, seen, longest) -> Any:
-    """A safe step to a facet: its wall is 0 if it leads to the hit, else _NEARER; or _BEYOND an edge, or _BEHIND it."""
+    """A safe step to a facet: where it leads is its wall."""
     depth, rate, bend = facet.phi(seen.r), 0.5 * dot(facet.normal, seen.v), 0.5 * dot(facet.normal, seen.a)
     is_behind, room = depth > facet.room.value, 2.0 * EPSILON * seen.coordinates
     if is_behind:
