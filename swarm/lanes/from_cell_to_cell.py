@@ -81,6 +81,9 @@ class UnderWay(Record):
         """Whether a lane may move towards a facet with a normal in this cone on its way through its cell."""
         raise NotImplementedError
 
+    def keep_way(self, gravity, mesh, i):
+        """Keep what `way` asks for, if that is long to compute: a lane may look at many blocks of facets."""
+
     def way(self, gravity, mesh, i):
         """That way, as `FlightInCell`."""
         raise NotImplementedError
@@ -275,6 +278,7 @@ def _find_cells(gravity, mesh, under, lanes, n):
     for i in range(index(n)):
         cone = NormalCone(column(rows, _AXIS, i), rows[_SINE, i])
         lanes.marked[i] = under.may_meet(gravity, mesh, i, cone)
+        under.keep_way(gravity, mesh, i)
 
 
 def _look(gravity, mesh, under, found, order, n):

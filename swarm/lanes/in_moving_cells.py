@@ -16,18 +16,20 @@ from ..kernel.jit import Array, outlined, select
 from ..kernel.limits import EPSILON
 from ..kernel.record import Record
 from ..kernel.vector import column, dot, norm, put
-from ..surfaces.facets.facet_cells import flight_in
+from ..surfaces.facets.facet_cells import CurveBound, FlightInCell, flight_in
 from ..surfaces.fields.members import member
 from ..surfaces.time_of_impact.course import rise_time
 from ..surfaces.time_of_impact.flights import Hit
 from ..surfaces.time_of_impact.march import lets_go
 from ..surfaces.time_of_impact.rising import InWallFrame, Level, ThirdDerivativeBound, flight_of
 from .from_cell_to_cell import MIDDLE, ROWS, SPEED, START, UnderWay, go_from_cell_to_cell, under_way
-from .table import LANES, STRIDE
+from .table import EIGHT, LANES, STRIDE
 
 # More rows of a lane that is under way: of its flight at its start, and of where it is in the frame of the mesh.
 _REMAINING, _FAST = SPEED + 3, SPEED + 4
 _PLACE, _PACE, _PULL, _ARM, _COORDINATES = ROWS, ROWS + 3, ROWS + 6, ROWS + 9, ROWS + 10
+# And its way through its cell, which begins where it is from the middle of that.
+_WAY, _BENT, _SLOW, _WEAK, _JERK, _REACH = ROWS + 11, ROWS + 14, ROWS + 17, ROWS + 18, ROWS + 19, ROWS + 20
 # Safe steps to one facet.
 _STEPS = 100
 # The bounds of a flight hold for so many times as long as it would be among its cells if it went straight on.
@@ -46,7 +48,7 @@ _TO_HIT, _NEARER, _BEYOND, _BEHIND, _PAST, _ALONE = 0.0, -1.0, -2.0, -3.0, -4.0,
 class UnderWayInMotion(UnderWay):
     """Those that go through the cells of a mesh that moves: curves in its frame."""
 
-    width, own = ROWS + 11, 8
+    width, own = ROWS + 21, 8
 
     def begin(self, i, lane, found):
         """As of `UnderWay`."""
@@ -103,11 +105,21 @@ class UnderWayInMotion(UnderWay):
         seen, span = self.seen(mesh, gravity, i), self.until[i] - self.time[i]
         return not cone.is_left(seen.v, seen.bounds(span).acceleration * span)
 
-    def way(self, gravity, mesh, i):
+    def keep_way(self, gravity, mesh, i):
         """As of `UnderWay`."""
-        seen, span = self.seen(mesh, gravity, i), self.until[i] - self.time[i]
-        at = column(self.rows, MIDDLE, i)
-        return flight_in(mesh.body.grid, at, seen.v, seen.a, span, seen.bounds(span))
+        rows, seen, span = self.rows, self.seen(mesh, gravity, i), self.until[i] - self.time[i]
+        at = column(rows, MIDDLE, i)
+        way = flight_in(mesh.body.grid, at, seen.v, seen.a, span, seen.bounds(span))
+        for row, vector in ((MIDDLE, way.at), (_WAY, way.way), (_BENT, way.bent)):
+            put(rows, row, i, vector)
+        for row, number in ((_SLOW, way.slow), (_WEAK, way.weak), (_JERK, way.curve.jerk), (_REACH, way.curve.reach)):
+            rows[row, i] = number
+
+    def way(self, _gravity, _mesh, i):
+        """As of `UnderWay`."""
+        rows = self.rows
+        at, way, bent = (column(rows, row, i) for row in (MIDDLE, _WAY, _BENT))
+        return FlightInCell(at, way, bent, rows[_SLOW, i], rows[_WEAK, i], CurveBound(rows[_JERK, i], rows[_REACH, i]))
 
     def meet(self, gravity, mesh, maybe, some):
         """As of `UnderWay`."""
@@ -137,11 +149,11 @@ def _meet(gravity, mesh, under, maybe, first, count):
         left += index(marked[n])
     for k in range(left):
         near.time[k] = under.time[index(near.lane[k])]
-    for k in range(left):
+    for k in range(near.in_eights(left)):
         near.approach(gravity, mesh, under, k, True)
     left = near.close_up(gravity, mesh, under, left)
     for _round in range(_TOGETHER):
-        for k in range(left):
+        for k in range(near.in_eights(left)):
             near.approach(gravity, mesh, under, k, False)
         left = near.close_up(gravity, mesh, under, left)
     for k in range(left):
@@ -162,6 +174,13 @@ class NearFacets(Record):
         i, facet, t = index(self.lane[k]), member(mesh.body, index(self.facet[k])), self.time[k]
         seen = under.seen(mesh, gravity, i) if is_first else mesh.seen(under.flight(gravity, i), t)
         self.step[k], self.leads[k] = _approach(facet, seen, t, under.until[i])
+
+    def in_eights(self, left):
+        """So many in whole vectors: the last one is there again, as one alone takes as long as eight."""
+        count = index((left + index(EIGHT - 1)) // EIGHT * EIGHT)
+        for k in range(left, count):
+            self.lane[k], self.facet[k], self.time[k] = self.lane[left - 1], self.facet[left - 1], self.time[left - 1]
+        return count
 
     def close_up(self, gravity, mesh, under, left):
         """Take the hits of those that are there; how many are on their way still."""

@@ -17,7 +17,7 @@ from ...kernel.grid import MARGIN, Grid, filled_grid
 from ...kernel.jit import Array, select
 from ...kernel.limits import TINY
 from ...kernel.record import Record
-from ...kernel.vector import Vec, absolute, dot, square, total
+from ...kernel.vector import Vec, absolute, dot, norm, square, total
 from ...state import Floats
 from ..fields.grid import enter_bodies
 from .free_room import rows_of, spare_of
@@ -214,7 +214,7 @@ class CurveBound(Record):
     """What bounds a flight that is no parabola, in the same units."""
 
     jerk: float  # how far it may be from the parabola at its end
-    curved: float  # how far from the line
+    reach: float  # how far from the middle of the line
 
 
 def from_middle(cells, place, r):
@@ -241,7 +241,7 @@ def flight_in(cells, at, v, pull, span, bounds=None):
         weak = _FULL * _OFF_SPEED * total(absolute(bent))
     if bounds is not None:
         half = 0.5 * unit * span * span
-        curve = CurveBound(half * bounds.jerk * span * (1.0 / 3.0), half * bounds.acceleration)
+        curve = CurveBound(half * bounds.jerk * span * (1.0 / 3.0), half * bounds.acceleration + 0.5 * norm(way))
     return FlightInCell(unit * at, way, bent, _FULL * _OFF_SPEED * total(absolute(way)) + 2.0 * weak, weak, curve)
 
 
@@ -307,9 +307,8 @@ def _passes_in_curve(here, at, level, half, radius):
     meets = meets & (not (is_known & _is_beside(away, half, radius * root, off, root)))
     if here.curve is None:
         return meets
-    # Around its middle it is in a ball of half its length.
-    middle, reach = at + 0.5 * here.way, radius + here.curve.curved + _NEAR_PLACE
-    reach = reach + 0.5 * math.sqrt(square(here.way))
+    # Around its middle it is in a ball.
+    middle, reach = at + 0.5 * here.way, radius + here.curve.reach + _NEAR_PLACE
     return meets & (square(middle) <= reach * reach)
 
 
