@@ -61,6 +61,9 @@ class UnderWay(Record):
         """The facets of the mesh."""
         raise NotImplementedError
 
+    def look_up(self, mesh, n):
+        """Look up what `see` asks for, of so many lanes."""
+
     def see(self, gravity, mesh, i):
         """Look where a lane is now in the frame of the mesh; its place."""
         raise NotImplementedError
@@ -257,6 +260,7 @@ def go_from_cell_to_cell(under, gravity, mesh, before, lanes, live):
 def _find_cells(gravity, mesh, under, lanes, n):
     """The cell that every lane is in, how far it comes from there, and whether it may meet a facet on this way."""
     cells, rows = under.facets(mesh).grid, under.rows
+    under.look_up(mesh, n)
     for i in range(index(n)):
         cell = cell_of(cells, under.see(gravity, mesh, i))
         put(rows, PLACE, i, cell.place)

@@ -30,6 +30,7 @@ _REMAINING, _FAST = SPEED + 3, SPEED + 4
 _PLACE, _PACE, _PULL, _ARM, _COORDINATES = ROWS, ROWS + 3, ROWS + 6, ROWS + 9, ROWS + 10
 # And its way through its cell, which begins where it is from the middle of that.
 _WAY, _BENT, _SLOW, _WEAK, _JERK, _REACH = ROWS + 11, ROWS + 14, ROWS + 17, ROWS + 18, ROWS + 19, ROWS + 20
+_PIECE = ROWS + 21
 # Safe steps to one facet.
 _STEPS = 100
 # The bounds of a flight hold for so many times as long as it would be among its cells if it went straight on.
@@ -48,7 +49,7 @@ _TO_HIT, _NEARER, _BEYOND, _BEHIND, _PAST, _ALONE = 0.0, -1.0, -2.0, -3.0, -4.0,
 class UnderWayInMotion(UnderWay):
     """Those that go through the cells of a mesh that moves: curves in its frame."""
 
-    width, own = ROWS + 21, 8
+    width, own = ROWS + 22, 8
 
     def begin(self, i, lane, found):
         """As of `UnderWay`."""
@@ -72,9 +73,17 @@ class UnderWayInMotion(UnderWay):
         """As of `UnderWay`."""
         return mesh.body
 
+    def look_up(self, mesh, n):
+        """As of `UnderWay`."""
+        track = mesh.drive.track
+        if track is not None:
+            for i in range(index(n)):
+                self.rows[_PIECE, i] = float(track.piece_at(self.time[i] - self.rows[_REMAINING, i]))
+
     def see(self, gravity, mesh, i):
         """As of `UnderWay`."""
-        rows, seen = self.rows, mesh.seen(self.flight(gravity, i), self.time[i])
+        rows = self.rows
+        seen = mesh.on_piece(int(rows[_PIECE, i])).seen(self.flight(gravity, i), self.time[i])
         put(rows, _PLACE, i, seen.r)
         put(rows, _PACE, i, seen.v)
         put(rows, _PULL, i, seen.a)
@@ -153,7 +162,9 @@ def _meet(gravity, mesh, under, maybe, first, count):
         near.approach(gravity, mesh, under, k, True)
     left = near.close_up(gravity, mesh, under, left)
     for _round in range(_TOGETHER):
-        for k in range(near.in_eights(left)):
+        count = near.in_eights(left)
+        near.look_up(mesh, under, count)
+        for k in range(count):
             near.approach(gravity, mesh, under, k, False)
         left = near.close_up(gravity, mesh, under, left)
     for k in range(left):
@@ -168,11 +179,22 @@ class NearFacets(Record):
     time: Array  # how far it has come
     step: Array  # the next safe step
     leads: Array  # where that leads, one of _TO_HIT, _NEARER, _PAST and _ALONE
+    piece: Array  # int64, on which piece of a path the mesh is
+
+    def look_up(self, mesh, under, count):
+        """Look up what `approach` asks for, of so many."""
+        track = mesh.drive.track
+        if track is not None:
+            for k in range(count):
+                self.piece[k] = track.piece_at(self.time[k] - under.rows[_REMAINING, index(self.lane[k])])
 
     def approach(self, gravity, mesh, under, k, is_first):
         """The next step, without a branch; at the start a lane is seen already."""
         i, facet, t = index(self.lane[k]), member(mesh.body, index(self.facet[k])), self.time[k]
-        seen = under.seen(mesh, gravity, i) if is_first else mesh.seen(under.flight(gravity, i), t)
+        if is_first:
+            seen = under.seen(mesh, gravity, i)
+        else:
+            seen = mesh.on_piece(self.piece[k]).seen(under.flight(gravity, i), t)
         self.step[k], self.leads[k] = _approach(facet, seen, t, under.until[i])
 
     def in_eights(self, left):
@@ -216,7 +238,7 @@ def near_facets():
     """Room for those of as many lanes as are looked at together."""
     return NearFacets(
         unwritten(STRIDE, np.int64), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
-        unwritten(STRIDE, np.float64), unwritten(STRIDE, np.float64),
+        unwritten(STRIDE, np.float64), unwritten(STRIDE, np.float64), unwritten(STRIDE, np.int64),
     )  # fmt: skip
 
 
@@ -257,7 +279,6 @@ def _approach(facet, seen, t, until):
     alone = (depth > facet.room.value) | lets_go(depth, rate, time, room) | (is_near & (not hits))
     leads = select(hits, _TO_HIT, select(time < longest, _NEARER, _PAST))
     return time, select(alone, _ALONE, select(time < longest, leads, _PAST))
-
 
 
 def _step_to(facet, seen, longest) -> Any:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ... import motion as motions
 from ...kernel.angle import nearly_sine_and_versine, sine_and_versine
+from ...kernel.arrays import index
 from ...kernel.jit import Array, select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Vec, cross, dot, square, vec
@@ -153,18 +154,28 @@ class Track(Record):
     cubics: Array  # (4, 3, pieces)
     end: Vec
     now: float
+    often: float  # how many pieces there are a second on average
+    piece: Any = None  # that of the one instant that is asked for, where it is known
+
+    def piece_at(self, t):
+        """The piece of a time."""
+        now, last = self.now + t, self.times.size - 2
+        # Of pieces that are of one length it is known at once.
+        guess = int(min(max((now - self.times[0]) * self.often, 0.0), float(last)))
+        if self.times[guess] <= now < self.times[guess + 1]:
+            return guess
+        # Without a branch: which half of the rest it is in no processor foresees.
+        low, rest = 0, last + 1
+        while rest > 1:
+            half = rest // 2
+            low = select(self.times[low + half] <= now, low + half, low)
+            rest -= half
+        return low
 
     def at(self, t):
         """Its value and first two derivatives."""
-        now = self.now + t
-        low, high = 0, self.times.size - 1
-        while high - low > 1:
-            middle = (low + high) // 2
-            if self.times[middle] <= now:
-                low = middle
-            else:
-                high = middle
-        s, cubics = now - self.times[low], self.cubics
+        low = index(self.piece_at(t) if self.piece is None else self.piece)
+        s, cubics = self.now + t - self.times[low], self.cubics
         a, b, c, d = (Vec(cubics[k, 0, low], cubics[k, 1, low], cubics[k, 2, low]) for k in range(4))
         return (
             (a - self.end) + s * (b + s * (c + s * d)),
@@ -246,6 +257,10 @@ class Drive(Record):
         """The same to some 1e-7."""
         return tuple(Wave(*nearly_sine_and_versine(rate * -remaining)) for rate in self.rates())
 
+    def on_piece(self, piece):
+        """The motion at one instant, at which a path is on this piece."""
+        return self if self.track is None else self._replace(track=self.track._replace(piece=piece))
+
     def pose(self, remaining):
         """The `PoseDerivatives` when so much of the frame is left [s]."""
         waves = self.waves_at(remaining) if self.waves is None else self.waves
@@ -317,7 +332,8 @@ def drive_of(surface: Surface, moment: float) -> Drive:
             harmonics.append(one.harmonic((0.0, 0.0, 0.0)))
         elif isinstance(one, motions.Path):
             cubics = one.cubics
-            track = Track(one.knots, cubics, _vector(one.displacement(moment)), moment)
+            often = (len(one.knots) - 1) / float(one.knots[-1] - one.knots[0])
+            track = Track(one.knots, cubics, _vector(one.displacement(moment)), moment, often)
             h, moves = np.diff(one.knots), cubics[1:].any(axis=(0, 1))
             time_scale = min(time_scale, _SLOW * float(h[moves].min(initial=math.inf)))
             # The velocity of each half of a piece lies within the triangle of the control points of its Bezier form.

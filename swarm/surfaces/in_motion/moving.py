@@ -50,6 +50,10 @@ class Moving(Record):
         remaining = flight.remaining - t
         return flight.seen(t, self.during(remaining, remaining), flight.pull)
 
+    def on_piece(self, piece):
+        """The wall at one instant, at which its path is on this piece."""
+        return self._replace(drive=self.drive.on_piece(piece))
+
 
 class TurningWall(Moving):
     """A wall that turns, with or without another motion."""
