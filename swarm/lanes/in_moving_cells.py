@@ -22,6 +22,7 @@ from ..surfaces.time_of_impact.course import rise_time
 from ..surfaces.time_of_impact.flights import Hit
 from ..surfaces.time_of_impact.march import lets_go
 from ..surfaces.time_of_impact.rising import InWallFrame, Level, ThirdDerivativeBound, flight_of
+from ..surfaces.time_of_impact.safe import CURVED
 from .from_cell_to_cell import MIDDLE, ROWS, SPEED, START, UnderWay, go_from_cell_to_cell, under_way
 from .table import EIGHT, LANES, STRIDE
 
@@ -33,9 +34,8 @@ _WAY, _BENT, _SLOW, _WEAK, _JERK, _REACH = ROWS + 11, ROWS + 14, ROWS + 17, ROWS
 _PIECE = ROWS + 21
 # Safe steps to one facet.
 _STEPS = 100
-# The bounds of a flight hold for so many times as long as it would be among its cells if it went straight on.
-_CURVED = 1.5
-# And for at most so many times the time in which the motion changes little: a turn by a radian and a quarter.
+# The bounds of a flight hold for at most so many times the time in which the motion changes little: a turn by a radian
+# and a quarter.
 _LONGEST = 25.0
 # A part of the room of a facet, by which a flight goes on that comes to its plane just beyond an edge.
 _ON = 0.5
@@ -99,7 +99,7 @@ class UnderWayInMotion(UnderWay):
         cells, most = mesh.body.grid, _LONGEST * mesh.drive.time_scale
         seen, longest = self.seen(mesh, gravity, i), self.last[i] - self.time[i]
         # The bound of the acceleration grows with the time that it holds for.
-        straight = _CURVED * until_out(None, cells, first, last, seen.r, seen.v)
+        straight = CURVED * until_out(None, cells, first, last, seen.r, seen.v)
         within = select(straight < longest, straight, longest)
         within = select(within < most, within, most)
         time = until_out(seen.pulls(within), cells, first, last, seen.r, seen.v)

@@ -20,6 +20,8 @@ from .rising import Flight, flight_of
 _ROUND_OFF = 8.0
 # The bounds of a flight in the cell of a field hold for at most so many times its length, after so many trials.
 _CLOSE, _TRIALS = 2.0, 8
+# At first they hold for so many times as long as it would be in its cell if it went straight on.
+CURVED = 1.5
 
 
 class ShortestStep(Record):
@@ -90,8 +92,8 @@ def until_next_cell(members, seen, longest):
     """
     grid = members.grid
     cell, time = cell_of(grid, seen.r), 0.0
-    # The bound of the acceleration grows with the time that it holds for: begin without it.
-    within = min(members.until_out(cell, seen.pulls(0.0), seen.r, seen.v), longest)
+    # The bound of the acceleration grows with the time that it holds for: that of a flight that goes straight on.
+    within = min(CURVED * members.until_out(cell, None, seen.r, seen.v), longest)
     for _k in range(_TRIALS):
         until = members.until_out(cell, seen.pulls(within), seen.r, seen.v)
         time = max(time, min(until, within))
