@@ -81,6 +81,16 @@ def test_the_bound_of_the_speed_of_a_path_is_near_its_largest_speed():
         assert max(speeds) <= (1.0 + 1e-12) * drive.fastest <= 1.25 * max(speeds)
 
 
+@pytest.mark.parametrize("times", [np.linspace(0.0, 3.0, 11), np.array([0.0, 0.01, 0.02, 2.5, 3.0]), (0.0, 3.0)])
+def test_the_piece_of_a_path_at_a_time(times):
+    path = swarm.Path(times, np.random.default_rng(5).normal(size=(len(times), 3)))
+    track = drive_of(swarm.Sphere(0.5, motion=path), 1.0).track
+    knots = track.times
+    asked = np.concatenate([knots, np.nextafter(knots, -np.inf), np.linspace(-1.0, 4.0, 500)])
+    wanted = np.clip(np.searchsorted(knots, 1.0 + (asked - 1.0), side="right") - 1, 0, len(knots) - 2)
+    assert [track.piece_at(t - 1.0) for t in asked.tolist()] == wanted.tolist()
+
+
 # --- Uniform motion: the trajectory at rest, transformed -------------------------------------------------
 
 
