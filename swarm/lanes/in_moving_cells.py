@@ -39,8 +39,8 @@ _STEPS = 100
 _LONGEST = 25.0
 # A part of the room of a facet, by which a flight goes on that comes to its plane just beyond an edge.
 _ON = 0.5
-# Lanes take so many safe steps to facets side by side after the first, as most need no more.
-_TOGETHER = 4
+# Lanes take so many safe steps to facets side by side, as most need no more.
+_TOGETHER = 5
 # Where a step to a facet leads: to the hit, nearer to it, to its plane beyond an edge, or to where it is not behind it;
 # past it in the time that counts, or where a lane takes its steps by itself.
 _TO_HIT, _NEARER, _BEYOND, _BEHIND, _PAST, _ALONE = 0.0, -1.0, -2.0, -3.0, -4.0, -5.0
@@ -158,14 +158,11 @@ def _meet(gravity, mesh, under, maybe, first, count):
         left += index(marked[n])
     for k in range(left):
         near.time[k] = under.time[index(near.lane[k])]
-    for k in range(near.in_eights(left)):
-        near.approach(gravity, mesh, under, k, True)
-    left = near.close_up(gravity, mesh, under, left)
     for _round in range(_TOGETHER):
         count = near.in_eights(left)
         near.look_up(mesh, under, count)
         for k in range(count):
-            near.approach(gravity, mesh, under, k, False)
+            near.approach(gravity, mesh, under, k)
         left = near.close_up(gravity, mesh, under, left)
     for k in range(left):
         near.go_alone(gravity, mesh, under, k)
@@ -188,13 +185,10 @@ class NearFacets(Record):
             for k in range(count):
                 self.piece[k] = track.piece_at(self.time[k] - under.rows[_REMAINING, index(self.lane[k])])
 
-    def approach(self, gravity, mesh, under, k, is_first):
-        """The next step, without a branch; at the start a lane is seen already."""
+    def approach(self, gravity, mesh, under, k):
+        """The next step, without a branch."""
         i, facet, t = index(self.lane[k]), member(mesh.body, index(self.facet[k])), self.time[k]
-        if is_first:
-            seen = under.seen(mesh, gravity, i)
-        else:
-            seen = mesh.on_piece(self.piece[k]).seen(under.flight(gravity, i), t)
+        seen = mesh.on_piece(self.piece[k]).seen(under.flight(gravity, i), t)
         self.step[k], self.leads[k] = _approach(facet, seen, t, under.until[i])
 
     def in_eights(self, left):
