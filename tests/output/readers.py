@@ -9,6 +9,7 @@ is in the trajectory too, bit by bit or in float32, or why it is not.
 
 import importlib
 import sys
+import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -18,6 +19,8 @@ import numpy as np
 
 import swarm
 
+# The longest line of text of the guide.
+LINE = 120
 GUIDE = Path(__file__).parents[2] / "examples" / "guide" / "readers.md"
 BEGIN, END = "<!-- written by tests/output/readers.py -->", "<!-- to here -->"
 
@@ -461,9 +464,8 @@ def markdown():
             cells.append("yes" if cell is None else f"({notes.setdefault(cell.reason, len(notes) + 1)})")
         gives = "all" if reader.gives == EVERY else ", ".join(WORDS[name] for name in reader.gives)
         lines.append(f"| `{reader.form}` | {reader.name} | {gives} | {reader.digits} | " + " | ".join(cells) + " |")
-    return "\n".join(
-        [*lines, "", *(f"{number}. {reason}" for reason, number in notes.items()), "", f"Read with {VERSIONS}."]
-    )
+    reasons = (f"{number}. {reason}" for reason, number in notes.items())
+    return "\n".join([*lines, "", *reasons, "", *textwrap.wrap(f"Read with {VERSIONS}.", LINE)])
 
 
 def main():

@@ -87,6 +87,9 @@ class Carried(Walls):
     def in_steps(self):
         return False
 
+    def aim(self, gravity):
+        return False
+
 
 class Marched(Carried):
     """The same where others move in any other way, by safe steps to these, or where some are bodies of a field."""

@@ -40,6 +40,8 @@ def pairs_in_one_place(
         matters: whether two surfaces are asked for; and whether back to back.
     """
     each = [_planes(one) for one in surfaces]
+    if not each:
+        return
     owners = np.repeat(np.arange(len(each)), [len(planes) for planes in each])
     numbers = np.concatenate([np.arange(len(planes)) for planes in each])
     keys = keys_of(np.concatenate(each), size)
