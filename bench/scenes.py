@@ -57,7 +57,7 @@ SCENES: dict[str, tuple[list[Surface], tuple[float, float, float] | None, str]] 
     "formula of degree 4, gravity": (
         [swarm.Formula("x**4/0.09 + y**4/0.09 + z**4/0.13 - 1")],
         GRAVITY,
-        "150",
+        "",
     ),
     "formula of the torus": ([swarm.Formula("(x**2 + y**2 + z**2 + 0.21)**2 - (x**2 + y**2)")], None, ""),
     "formula of the quadric": ([swarm.Formula("9*x**2 + 6*y**2 + 4*z**2 + 2*x*y - 1")], None, ""),
