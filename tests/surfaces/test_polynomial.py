@@ -11,7 +11,7 @@ from exact import EXACT, TOUCHED, Flight
 
 import swarm
 from swarm.kernel.gravity import Gravity, accelerated, displacement
-from swarm.kernel.vector import dot, vec
+from swarm.kernel.vector import Vec, dot, vec
 from swarm.surfaces.formulas.derivatives import derived
 from swarm.surfaces.formulas.numbers import OwnNumbers, SmoothCavity, SmoothSolid
 from swarm.surfaces.formulas.polynomial import (
@@ -159,6 +159,15 @@ def _require_first_roots_of_falls(family, seed, flights=8):
 @pytest.mark.parametrize("family", FAMILIES)
 def test_falls_meet_formulas_of_degree_4_at_the_first_root(family):
     assert sum(_require_first_roots_of_falls(family, seed, 4) for seed in range(3)) > 3
+
+
+def test_a_fall_of_plain_numbers_away_from_the_box_of_a_solid_meets_nothing():
+    """Kernels in plain Python have gravity as it was given, and no number that is not of NumPy may be divided by."""
+    wall = swarm.Formula("x**4 + y**4 + z**4 - 0.0001", side="outside", bounds=BOX).numbers()
+    below, down = Vec(np.float64(0.0), np.float64(0.0), np.float64(-2.5)), Vec(0.0, 0.0, -1.0)
+    with np.errstate(all="ignore"):
+        time, found = wall.falling_hit(below, Vec(np.float64(0.1), np.float64(0.0), np.float64(-0.2)), down)
+    assert not (found and time < math.inf)
 
 
 @pytest.mark.long

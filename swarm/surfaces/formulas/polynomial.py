@@ -3,6 +3,8 @@
 import math
 from typing import Any
 
+import numpy as np
+
 from ...kernel.gravity import Gravity, accelerated, as_vector, displacement, rise_time, rise_time_by, rise_time_inside
 from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
@@ -21,6 +23,7 @@ _ROUND_OFF = 1e-13
 _REFINED = 1e-4
 # b^2 - a c has lost digits where it is less than this part of b^2.
 _CANCELS = 1.0 / 64.0
+_ONE = np.float64(1.0)
 
 
 class _Face(Majorant):
@@ -35,7 +38,8 @@ class _Face(Majorant):
 def _face(low, high, x, v, pull):
     """The face beyond which a coordinate is, or any if it is beyond none."""
     below = x - low < high - x
-    sign = select(below, 1.0, -1.0)
+    # Numbers of NumPy: in plain Python no other quotient by 0 is infinite.
+    sign = select(below, _ONE, -_ONE)
     c, b, a2 = select(below, x - low, high - x), 0.5 * sign * v, 0.5 * sign * pull
     return _Face(c, b, a2, select(c < 0.0, rise_time(c, b, a2), 0.0))
 
