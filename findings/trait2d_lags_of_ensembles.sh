@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Mean square displacements of many tracks stand at the time of the lag before, and a fit finds the same 1e-10 of any.
+# Mean square displacements of many tracks are one lag early, and a fit in micrometres returns 2e-10 for any diffusivity.
 #
 # TRAIT2D 1.2.1. Expected: `ListOfTracks.get_msd` returns lags and their means; `msd_analysis` fits the diffusivity.
 # Seen: the times that it returns are those of the longest track's points, so that the mean of lag 1 stands at the time
