@@ -96,9 +96,9 @@ def require_same_versions(client: Any) -> None:
     found = client.get_versions(packages=list(_PACKAGES))
     here = _versions(found["client"])
     for address, versions in sorted(found["workers"].items()):
-        for name, there in _versions(versions).items():
-            if there != here[name]:
-                came = "has none" if there is None else f"has {there}"
+        for name, version in _versions(versions).items():
+            if version != here[name]:
+                came = "has none" if version is None else f"has {version}"
                 raise SceneError(
                     f"every worker must have {name} {here[name]}, as this machine has, got the worker {address}, which "
                     f"{came}; install the same packages there"

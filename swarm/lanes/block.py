@@ -130,8 +130,8 @@ def _look(method, walls, state, lanes, live):
             status = Status.STALLED.value
         elif lane.stands(method, p) and lane.looked_hits == lane.hits:
             status = Status.TIMELESS.value
-        elif (method.holds and lane.goes_round(p)) or (
-            method.holds and not method.laws.change_energy and lane.hardly_turns(p, most_hits)
+        elif method.holds and (
+            lane.goes_round(p) or (not method.laws.change_energy and lane.hardly_turns(p, most_hits))
         ):
             status = Status.STALLED.value
         if status != Status.DONE.value:
