@@ -78,6 +78,10 @@ _FOLDERS = [
     ("surfaces", "surfaces", "polyhedron=room"),
     ("triangles", "triangles", "given=sharp"),
     ("events", "events.colliding", "resting"),
+    ("events.colliding", "events", "growing=growing_run"),
+    ("events.colliding", "events.colliding", "ahead=events"),
+    ("pictures", "pictures", "silhouette=scenery"),
+    ("recording", "recording", "about=looks sight=looks"),
     ("output", "words", "amounts content facts gone named nouns verdicts words=titles"),
 ]
 

@@ -8,7 +8,7 @@ import swarm
 from swarm.ball_numbers import balls_volume
 from swarm.events import growing_run as growing
 from swarm.events import packing
-from swarm.events.colliding.growing import Growth
+from swarm.events.growing_run import Growth
 from swarm.kernel.vector import Vec, dot, square
 from swarm.placing.cells import overlaps_of
 

@@ -12,13 +12,13 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from ..state import Floats
-from ..triangles.curves import runs
+from ..triangles.curves import finer, joined, runs, turning, zeros
 from ..triangles.shape import Shape
 from .balls import colours_of
 from .colours import Colours
+from .eye import Eye
 from .framed import eye_of, window
 from .raster import Raster, corners_of, lit
-from .silhouette import silhouette
 from .style import CAVITY_LINE, SOLID, SOLID_LINE, backdrop
 from .triad import BAR, STRIP, draw_triad, say_beyond
 
@@ -32,6 +32,8 @@ _CLEAR, _TINTED = 0.30, 0.95
 _DOTS, _SMALL, _LARGE = 2.5e4, 0.3, 24.0
 Ties = tuple[Floats, Colours]
 NO_TIES: Ties = np.empty((0, 0, 3)), np.empty(0, np.uint32)
+# Triangles that are nearly parallel to the way to the eye turn away from it by round-off only.
+_ROUND_OFF = 1e-9
 
 
 def red_green_blue(packed: Colours) -> Floats:
@@ -89,14 +91,14 @@ class Scenery:
                 raster.triangles(self.eye.seen(shape.vertices), chosen, paint(normals))
         self._show(self._back, 0.5)
         far, self._near_curves = self._sorted()
-        for curves, colour, wide, alpha in far:
-            self._lines(curves, colour, wide, alpha, 1.0, self.still)
+        for lines, colour, wide, alpha in far:
+            self._lines(lines, colour, wide, alpha, 1.0, self.still)
         if np.isfinite(self.opaque.depth).any():
             self._show(self.opaque, 1.5)
         for shape in self.shapes:
             if shape.solid and not shape.many:
-                curves = self._cut(shape.edges + silhouette(shape, self.eye), self.opaque)
-                self._lines(curves, SOLID_LINE, 0.9, 1.0, 1.6, self.still)
+                lines = self._cut(shape.edges + silhouette(shape, self.eye), self.opaque)
+                self._lines(lines, SOLID_LINE, 0.9, 1.0, 1.6, self.still)
                 self._lines(self._cut(shape.levels, self.opaque), SOLID_LINE, 0.4, 0.6, 1.6, self.still)
 
     def _sorted(self) -> tuple[list[tuple[list[Floats], str, float, float]], list[Floats]]:
@@ -141,11 +143,7 @@ class Scenery:
 
     def _fine(self, curve: Floats) -> Floats:
         """A curve as it is seen, with points so near to each other that it can be cut."""
-        seen, step = self.eye.seen(curve), float((self.high - self.low).max()) / 250.0
-        pieces = np.sqrt((np.diff(seen, axis=0) ** 2).sum(axis=1))
-        many = np.maximum(1, np.ceil(pieces / step).astype(np.int64))
-        place = np.concatenate([[0.0], np.cumsum(np.repeat(1.0 / many, many))])
-        return np.stack([np.interp(place, np.arange(len(seen)), one) for one in seen.T], axis=1)
+        return finer(self.eye.seen(curve), float((self.high - self.low).max()) / 250.0)
 
     def clear(self) -> None:
         """Take away what has been drawn of walls."""
@@ -239,3 +237,22 @@ def _glass(normals: Floats) -> Floats:
     part = part * (1.0 - 0.25 * normals[:, 1:2])
     paper, tint = (np.array(to_rgb(colour)) for colour in backdrop())
     return np.asarray((1.0 - part) * paper + part * tint)
+
+
+def silhouette(shape: Shape, eye: Eye) -> list[Floats]:
+    """The curves (k, 3) [m] at which normals turn away from the eye; of facets the sides at which one of two does."""
+    if not len(shape.triangles):
+        return []
+    towards = shape.normals @ eye.near
+    towards = np.where(np.abs(towards) < _ROUND_OFF, _ROUND_OFF, towards)
+    return zeros(shape.vertices, shape.triangles, towards) + _of_facets(shape, towards)
+
+
+def _of_facets(shape: Shape, towards: Floats) -> list[Floats]:
+    """The sides between a facet that faces the eye and one that does not, where these have corners of their own."""
+    corners = towards[shape.triangles]
+    if (np.ptp(corners, axis=1) > 1e-12).any():
+        return []  # smooth walls: their creases are edges
+    points, places = np.unique(shape.vertices, axis=0, return_inverse=True)
+    triangles = places.reshape(-1)[shape.triangles]
+    return joined(points, turning(points, triangles, corners[:, 0] > 0.0))

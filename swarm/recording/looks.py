@@ -1,15 +1,23 @@
-"""The parts of a recording that do not change: layout, walls, legend, names and colours of time series."""
+"""The parts of a recording that do not change: layout, eye, walls, legend, time series, and what it shows in words."""
 
+import math
 from typing import Any
 
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from ..pictures import colours, series
-from ..pictures.colours import BACKGROUND, curve_colour, rgb
+from ..pictures.colours import BACKGROUND, Scale, curve_colour, rgb
 from ..pictures.drawn import Drawn
+from ..pictures.eye import Eye, eye_for
 from ..state import Floats
+from ..surfaces.plane import PLANES, along
 from ..triangles.shape import Shape
+from ..words import titles as words
+from ..words import verdicts
+from ..words.amounts import many
+from ..words.content import Content
 from .playback import LINES, MESH, PARTICLES
 
 # The colours of matplotlib's pictures.
@@ -32,6 +40,11 @@ _FIRST = (
 # Between the faces of bodies, which have no shading.
 _EDGE = (10, 10, 12, 255)
 SOLID_LOOKS = _SOLID, _SOLID_WIRE
+_PATH = "/about"
+# The viewer's angle of view from bottom to top, and the width of the narrowest panel as a part of its height.
+ANGLE, NARROWEST = math.radians(55.0), 0.8
+# The part of the panel that the scene fills.
+_FILLED = 0.97
 
 
 def path_of(shape: Shape) -> str:
@@ -95,10 +108,72 @@ def blueprint(lines: list[series.Line], noun: str, eye: Any = None, plane: str |
         plots.append(rrb.TimeSeriesView(origin="/", contents=paths, name=name, plot_legend=legend))
     seen, rest = rrb.Vertical(*plots[:_SEEN], name="graphs"), rrb.Vertical(*plots[_SEEN:], name="more graphs")
     graphs = rrb.Tabs(seen, rest, active_tab=0) if plots[_SEEN:] else seen
-    about = rrb.TextDocumentView(origin="/about", name="what is shown")
+    about = rrb.TextDocumentView(origin=_PATH, name="what is shown")
     return rrb.Blueprint(
         rrb.Horizontal(rrb.Vertical(scene, about, row_shares=[5, 1]), graphs, column_shares=[1, 1]),
         rrb.TimePanel(timeline="frame", play_state="paused", state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
     )
+
+
+def log_about(stream: Any, drawn: Drawn, scale: Scale, stride: int, center: Floats, plane: str | None = None) -> None:
+    """Log the meaning of the colours, what is shown of how many, the origin, and the plane of two dimensions."""
+    of = f" of {many(drawn.count)}" if drawn.shown < drawn.count else ""
+    every = f", every {stride}th frame" if stride > 1 else ""
+    name, _, unit = scale.quantity.rstrip("]").partition(" [")
+    text = (
+        f"**{many(drawn.shown)}{of} {drawn.noun}{every}**, coloured by {name}: {scale.low:g} (dark blue) to "
+        f"{scale.high:g} {unit}".rstrip()
+        + f" (orange). log10 of 0 is drawn at {series.NOTHING:g}."
+    )
+    if center.any():
+        text += f" Positions are less {tuple(center.tolist())} m."
+        stream.log(_PATH, rr.AnyValues(center=center), static=True)
+    if plane is not None:
+        stream.log(_PATH, rr.AnyValues(plane=plane), static=True)
+    stream.log(_PATH, rr.TextDocument(text, media_type="text/markdown"), static=True)
+    values = rr.AnyValues(**vars(scale), particles=drawn.count, shown=drawn.shown, stride=stride, noun=drawn.noun)
+    stream.log(_PATH, values, static=True)
+
+
+def log_outcome(stream: Any, content: Content) -> None:
+    """Log the run in words, and whether it went well, when it has ended."""
+    stream.log(_PATH, rr.AnyValues(title=words.title(content), verdicts=verdicts.marked(content)), static=True)
+
+
+def eye_controls(plane: str | None, shapes: list[Shape], points: Floats, center: Floats) -> Any:
+    """The eye that sees all walls and the points (n, 3); None where these are at one place.
+
+    It is given with the origin of the recording, `center`. That of a scene of two dimensions is above its plane.
+    """
+    curves = [curve for shape in shapes for curve in (*shape.wires, shape.vertices) if len(curve)]
+    every = np.concatenate([points[~np.isnan(points[:, 0])], *curves])
+    if not len(every) or not np.ptp(every, axis=0).any():
+        return None
+    low, high = every.min(axis=0) - center, every.max(axis=0) - center
+    eye, middle = _eye(plane, low, high), 0.5 * (low + high)
+    place = middle + distance(eye, high - low) * eye.near
+    # About which the scene is turned by hand.
+    up = eye.up if plane else np.array([0.0, 0.0, 1.0])
+    return rrb.EyeControls3D(position=place, look_target=middle, eye_up=up)
+
+
+def _eye(plane: str | None, low: Floats, high: Floats) -> Eye:
+    across = PLANES.get(plane)
+    if across is None:
+        return eye_for(low, high)
+    right, up = (np.eye(3)[axis] for axis in along(across))
+    return Eye(right, up, np.cross(right, up))
+
+
+def distance(eye: Eye, size: Floats) -> float:
+    """The distance from the middle of a box from which all of its corners are seen.
+
+    A corner that is x to the right, y up and z nearer than the middle is seen from D where |x| and |y| are at most
+    (D - z) times the tangents of half the angles of view.
+    """
+    signs = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
+    x, y, z = eye.seen(signs * size).T
+    upright = _FILLED * math.tan(0.5 * ANGLE)
+    return float((z + np.maximum(np.abs(x) / NARROWEST, np.abs(y)) / upright).max())

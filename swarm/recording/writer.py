@@ -45,7 +45,7 @@ from ..scene import Scene
 from ..triangles import solids
 from ..triangles.shapes import shapes_of, since_start
 from ..words.content import Content
-from . import about, instanced, looks, sight, viewer
+from . import instanced, looks, viewer
 from .playback import LINES, MESH, PARTICLES, is_whole
 
 # Bytes of a particle (position and colour), of a line (ends, where it begins, colour), and at most of a number of a
@@ -170,7 +170,7 @@ class RecordingWriter:
         try:
             sinks += [rr.FileSink(self.file)] if self.file else []
             plane = self._scene.plane
-            eye = sight.eye_controls(plane, self._shapes, self._at_start.T, self._center)
+            eye = looks.eye_controls(plane, self._shapes, self._at_start.T, self._center)
             blueprint = looks.blueprint(self._series, self._drawn.noun, eye, plane)
             if sinks:
                 self.stream.set_sinks(*sinks, default_blueprint=blueprint)
@@ -195,7 +195,7 @@ class RecordingWriter:
         if not self._has_doors:
             self._log_solids(many, static=True)
         looks.log_series(self.stream, self._series)
-        about.log_about(self.stream, self._drawn, self._scale, self._stride, self._center, self._scene.plane)
+        looks.log_about(self.stream, self._drawn, self._scale, self._stride, self._center, self._scene.plane)
 
     def _error(self, what: str, error: Exception) -> FileError:
         """The error of a recording that ends here."""
@@ -256,7 +256,7 @@ class RecordingWriter:
         """Log the run in words, as plots have it above and below."""
         seen = {name: np.array([row[name] for row in self._seen]) for name in self._seen[0]}
         known = {"start": self._start}
-        about.log_outcome(self.stream, Content("", self._scene, self._method, self._body, self.count, seen, known))
+        looks.log_outcome(self.stream, Content("", self._scene, self._method, self._body, self.count, seen, known))
 
     def _send_points(self, numbers: Any, times: Any, points: Any, colour: Any, lines: Any) -> None:
         """Send points (frames, n, 3) with their colours, and what ties them together."""

@@ -27,7 +27,6 @@ from .measures import Measures
 from .options import Task
 from .outputs import recorder_of, writer_of
 from .preflight import hints
-from .preflight.user_code import explained
 from .progress import LOOK, Display, Standstill, display
 from .session import Session
 from .tally import Watched, tally_of
@@ -89,7 +88,7 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
         hints.give(task)
     until, span_of, kept = task.options.until, task.method.span, Columns()
     still = Standstill(lambda: failures.unproved(task.scene))
-    with explained(task), _begun(task, session) as (run, writer, show, (log, tally, _counters), measures):
+    with failures.explained(task), _begun(task, session) as (run, writer, show, (log, tally, _counters), measures):
         with run, writer or contextlib.nullcontext(lambda *frame: None) as write:
             for number, before, moment in session.frames(task.options.times):
                 if number == 0:

@@ -8,7 +8,7 @@ import pytest
 import swarm
 from swarm.pictures import graphs, plots, series
 from swarm.pictures.eye import Eye
-from swarm.recording import about, looks, playback, sheet, sight
+from swarm.recording import looks, playback, sheet
 from swarm.triangles.shapes import shapes_of
 from swarm.words import titles as words
 from swarm.words import verdicts
@@ -30,7 +30,7 @@ def recorded(folder, scene=SCENE, method=None, n=60, shown=5000):
 @pytest.fixture
 def older(monkeypatch):
     """Recordings are as those of versions that did not say how a run ended."""
-    monkeypatch.setattr(about, "log_outcome", lambda *_: None)
+    monkeypatch.setattr(looks, "log_outcome", lambda *_: None)
 
 
 def texts(held, monkeypatch, folder):
@@ -104,7 +104,7 @@ def seen_from(place, target, up, points):
     depth = (points - place) @ ahead
     assert (depth > 0.0).all()
     return np.array([(points - place) @ right, (points - place) @ np.cross(right, ahead)]) / depth / math.tan(
-        0.5 * sight.ANGLE
+        0.5 * looks.ANGLE
     )  # fmt: skip
 
 
@@ -125,7 +125,7 @@ def seen_from(place, target, up, points):
 def test_the_eye_sees_all_corners_of_the_box_and_no_more_than_it_must(scene, plane):
     center = np.array([3.0, -2.0, 1.0])
     shapes = shapes_of(scene, np.zeros((3, 1)))
-    controls = sight.eye_controls(plane, shapes, np.full((2, 3), np.nan), center)
+    controls = looks.eye_controls(plane, shapes, np.full((2, 3), np.nan), center)
     view = (controls.position, controls.look_target, controls.eye_up)
     place, target, up = (np.array(part.as_arrow_array().to_pylist()[0]) for part in view)
     every = np.concatenate([curve for shape in shapes for curve in (*shape.wires, shape.vertices) if len(curve)])
@@ -133,14 +133,14 @@ def test_the_eye_sees_all_corners_of_the_box_and_no_more_than_it_must(scene, pla
     np.testing.assert_allclose(target, 0.5 * (low + high), atol=1e-6)
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
     x, y = np.abs(seen_from(place, target, up, corners))
-    filled = max(x.max() / sight.NARROWEST, y.max())
+    filled = max(x.max() / looks.NARROWEST, y.max())
     assert filled == pytest.approx(0.97, abs=1e-3)
     assert up[2] == 1.0 or plane is not None
 
 
 def test_a_lone_point_has_the_eye_of_the_viewer():
-    assert sight.eye_controls(None, [], np.zeros((1, 3)), np.zeros(3)) is None
-    assert sight.distance(Eye(*np.eye(3)), np.ones(3)) > 1.0
+    assert looks.eye_controls(None, [], np.zeros((1, 3)), np.zeros(3)) is None
+    assert looks.distance(Eye(*np.eye(3)), np.ones(3)) > 1.0
 
 
 def test_four_graphs_are_seen_and_the_others_are_in_a_tab():

@@ -13,8 +13,7 @@ import swarm
 from swarm.pictures import colours, drawing, film, flat, framed, plots, style, triad
 from swarm.pictures.eye import eye_at, eye_for
 from swarm.pictures.raster import Raster
-from swarm.pictures.scenery import Scenery
-from swarm.pictures.silhouette import silhouette
+from swarm.pictures.scenery import Scenery, silhouette
 from swarm.triangles.shapes import cell_of, shapes_of
 
 NOWHERE = np.zeros((3, 1))
