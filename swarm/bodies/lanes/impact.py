@@ -105,13 +105,8 @@ def _blow(bodies, state, name, frame, found, i):
     m, wide = ties.links + touching.guides, touching.width(name, found)
     rows = wide * found
     lost, elastic = 0.0, bounces == 1.0 and not touching.dissipate(name, found)
-    blow = BodyImpact(
-        bodies, name, frame, wide, scratch((3, m), np.float64), scratch((m, m), np.float64),
-        scratch((rows, m), np.float64), scratch((rows, rows), np.float64),
-    )  # fmt: skip
+    blow = body_impact(bodies, name, frame, (wide, found), i)
     rate, wanted, p = scratch(rows, np.float64), scratch(rows, np.float64), scratch(rows, np.float64)
-    blow.hold(i)
-    blow.respond()
     for a in range(rows):
         rate[a] = blow.rate(a, i)
         # Without what links take of it: the velocity has a part across them, of the order of the scheme.
@@ -123,31 +118,35 @@ def _blow(bodies, state, name, frame, found, i):
     sweep(touching, (name, p, wide, wide), blow.schur, wanted, p, SWEEPS)
     if max(p) == 0.0:
         return False
-    is_led = max(ties.led) >= 0
-    moved = kinetic_of(ties, v, i) if is_led else 0.0
     against = scratch(m, np.float64)
     if not elastic:
         # Links of lengths that change give their energy away in the next short step, which takes a change back.
         lost += blow.strain(scratch(m, np.float64), against, i)
-    work = blow.work(state, p, i)
+        lost = blow.taken(lost, rate, p)
     before = scratch((3, found), np.float64)
     if state.watchers.log is not None:
         for a in range(found):
             put(before, 0, a, touching.place(v, name[a, 0], i))
-    blow.give(p, against, i)
+    state.work[number] += blow.push(state, p, against, lost, i)
+    state.dissipated[number] += lost
     for a in range(found):
         state.impulse[bodies.walls.row(float(name[a, 1])), number] += p[wide * a]
         if p[wide * a] > 0.0:
             blow.tell(state, a, column(before, 0, a), p[wide * a], i)
-    if not elastic:
-        # p times the mean of the rates before and after
-        for a in range(rows):
-            lost += 0.5 * p[a] * (rate[a] + missing(blow.schur, a, rate[a], p))
-    state.dissipated[number] += lost
-    if is_led:
-        work = (kinetic_of(ties, v, i) - moved) + lost
-    state.work[number] += work
     return True
+
+
+def body_impact(bodies, name, frame, size, i):
+    """The `BodyImpact` of contacts, each with so many directions: `size` are (directions, contacts)."""
+    wide, found = size
+    m, rows = bodies.ties.links + bodies.touching.guides, wide * found
+    blow = BodyImpact(
+        bodies, name, frame, wide, scratch((3, m), np.float64), scratch((m, m), np.float64),
+        scratch((rows, m), np.float64), scratch((rows, rows), np.float64),
+    )  # fmt: skip
+    blow.hold(i)
+    blow.respond()
+    return blow
 
 
 class BodyImpact(Record):
@@ -173,6 +172,31 @@ class BodyImpact(Record):
         if bodies.walls_move():
             u = bodies.slip(bodies.walls_now(i), wall, bodies.spot(bodies.lanes.r, k, i), u)
         return dot(self.direction(a), u)
+
+    def unstrained_rate(self, a, strain, i):
+        """That velocity when links and guides have taken their strains, the rates J v."""
+        rate = self.rate(a, i)
+        for row in range(strain.size):
+            rate -= self.answer[a, row] * strain[row]
+        return rate
+
+    def taken(self, lost, rate, p):
+        """The energy lost by strains, with what impulses take: p times the mean of the rates before and after."""
+        for a in range(p.size):
+            lost += 0.5 * p[a] * (rate[a] + missing(self.schur, a, rate[a], p))
+        return lost
+
+    def push(self, state, p, against, lost, i):
+        """Give impulses of walls and of links and guides, and return the work of walls and of led points.
+
+        What led points work is the change of the kinetic energy, of which `lost` is no part.
+        """
+        ties, v = self.bodies.ties, self.bodies.lanes.v
+        is_led = max(ties.led) >= 0
+        before = kinetic_of(ties, v, i) if is_led else 0.0
+        work = self.work(state, p, i)
+        self.give(p, against, i)
+        return (kinetic_of(ties, v, i) - before) + lost if is_led else work
 
     def work(self, state, p, i):
         """Book the work of each wall that moves with these impulses, which push the body against the directions."""

@@ -19,8 +19,8 @@ from ...kernel.jit import outlined
 from ...kernel.limits import EPSILON
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, column, dot, square
-from .contacts import MOST_CONTACTS, direction, missing, put_direction
-from .impact import BodyImpact, chatters, kinetic_of
+from .contacts import MOST_CONTACTS, direction, put_direction
+from .impact import body_impact, chatters
 
 # The smaller one of the two inverse masses across a normal counts as 0 where its part of the other is below this.
 _HELD = 1e-12
@@ -90,19 +90,12 @@ def _by_law(bodies, state, name, frame, contact, i):
     one[0, 0], one[0, 1] = name[a, 0], w
     for d in range(3):
         put_direction(axes, 0, d, direction(frame, a, d))
-    blow = BodyImpact(
-        bodies, one, axes, 3, scratch((3, m), np.float64), scratch((m, m), np.float64), scratch((3, m), np.float64),
-        scratch((3, 3), np.float64),
-    )  # fmt: skip
+    blow = body_impact(bodies, one, axes, (3, 1), i)
     strain, against = scratch(m, np.float64), scratch(m, np.float64)
     rate, p = scratch(3, np.float64), scratch(3, np.float64)
-    blow.hold(i)
-    blow.respond()
     lost = blow.strain(strain, against, i)
     for d in range(3):
-        rate[d] = blow.rate(d, i)
-        for row in range(m):
-            rate[d] -= blow.answer[d, row] * strain[row]
+        rate[d] = blow.unstrained_rate(d, strain, i)
     if not rests and rate[0] * rate[0] <= _ROUND_OFF * _fastest(bodies, i):
         return False
     mass = 1.0 / blow.schur[0, 0]
@@ -125,16 +118,10 @@ def _by_law(bodies, state, name, frame, contact, i):
         lost = 0.0
         for row_of_tie in range(m):
             against[row_of_tie] = 0.0
-    for d in range(3):
-        lost += 0.5 * p[d] * (rate[d] + missing(blow.schur, d, rate[d], p))
-    is_led = max(ties.led) >= 0
-    before = kinetic_of(ties, bodies.lanes.v, i) if is_led else 0.0
-    work = blow.work(state, p, i)
-    blow.give(p, against, i)
+    lost = blow.taken(lost, rate, p)
+    work = blow.push(state, p, against, lost, i)
     blow.tell(state, 0, arrives, p[0], i)
     state.impulse[row, number] += p[0]
-    if is_led:
-        work = (kinetic_of(ties, bodies.lanes.v, i) - before) + lost
     _book(state, touching.laws, (row, number), lost, work, 0.5 * mass * sent.lost)
     return True
 

@@ -16,8 +16,8 @@ from ...kernel.arrays import scratch
 from ...kernel.jit import outlined
 from ...kernel.limits import ENERGY_OF_IMPACT
 from ...kernel.vector import column, dot, norm, square
-from .contacts import MOST_CONTACTS, direction, missing, put_direction, put_frame, sweep
-from .impact import SHORT, SWEEPS, BodyImpact, kinetic_of
+from .contacts import MOST_CONTACTS, direction, put_direction, put_frame, sweep
+from .impact import SHORT, SWEEPS, body_impact
 
 
 def is_short(bodies, i):
@@ -62,10 +62,6 @@ def stop(bodies, state, i):
     m, wide = ties.links + touching.guides, touching.width(active.name[i], found)
     rows = wide * found
     name, frame = scratch((MOST_CONTACTS, 2), np.int64), scratch((MOST_CONTACTS, 3, 3), np.float64)
-    blow = BodyImpact(
-        bodies, name, frame, wide, scratch((3, m), np.float64), scratch((m, m), np.float64),
-        scratch((rows, m), np.float64), scratch((rows, rows), np.float64),
-    )  # fmt: skip
     rate, p, change = scratch(rows, np.float64), scratch(rows, np.float64), scratch(rows, np.float64)
     strain, against = scratch(m, np.float64), scratch(m, np.float64)
     for a in range(found):
@@ -80,25 +76,14 @@ def stop(bodies, state, i):
         if press > 0.0 and active.impulse[i, a] > 0.0:
             for d in range(wide):
                 p[wide * a + d] = active.impulse[i, a] * (active.press[i, 3 * a + d] / press)
-    blow.hold(i)
-    blow.respond()
+    blow = body_impact(bodies, name, frame, (wide, found), i)
     lost = blow.strain(strain, against, i)
     for a in range(rows):
-        rate[a] = blow.rate(a, i)
-        for row in range(m):
-            rate[a] -= blow.answer[a, row] * strain[row]
+        rate[a] = blow.unstrained_rate(a, strain, i)
     sweep(touching, (name, p, wide, wide), blow.schur, rate, change, SWEEPS)
-    for a in range(rows):
-        # As of a blow: the change of p times the mean of the rates before and after.
-        lost += 0.5 * change[a] * (rate[a] + missing(blow.schur, a, rate[a], change))
-    is_led = max(ties.led) >= 0
-    before = kinetic_of(ties, lanes.v, i) if is_led else 0.0
-    work = blow.work(state, change, i)
-    blow.give(change, against, i)
+    lost = blow.taken(lost, rate, change)
     state.dissipated[number] += lost
-    if is_led:
-        work = (kinetic_of(ties, lanes.v, i) - before) + lost
-    state.work[number] += work
+    state.work[number] += blow.push(state, change, against, lost, i)
 
 
 def _sticks(bodies, i):
