@@ -19,14 +19,14 @@ class Pairs(Validated):
             energy.
         friction: Coulomb's coefficient between particles, 0 or more. Particles then have a spin, of 0 where none is
             given.
-        contact_duration: t_c [s], of Impact: a particle that met another less than this before meets particles and
-            walls without a loss, so that losing impacts never become infinitely many in a time. 0: never; None: 1e-4
-            of the time in which the smallest particle flies its diameter, under gravity 1e-3 of that in which it flies
-            or falls so far. Balls that rest under gravity collide without end, about once in this time: a run says so,
-            and a longer time, or `Penalty`, makes it shorter.
-        rolling: the resistance to rolling, of Penalty, 0 or more: an angular impulse against the relative angular
-            velocity across the normal, of at most this times R_i R_j/(R_i + R_j) times the normal impulse, and at most
-            what stops the rolling. With friction.
+        contact_duration: t_c [s], for Impact: for this time after a particle met another one, it meets particles and
+            walls without a loss. So lossy impacts are never infinitely many in a finite time. 0: each impact has its
+            loss; None: 1e-4 of the time in which the smallest particle flies its diameter, under gravity 1e-3 of the
+            time in which it flies or falls that far. Balls that rest under gravity collide about once in this time,
+            without end, and the run warns of it. A longer time makes such a run shorter, and so does `Penalty`.
+        rolling: the coefficient of rolling resistance, for Penalty with friction, 0 or more. An angular impulse opposes
+            the relative angular velocity across the normal. It is at most this coefficient times R_i R_j/(R_i + R_j)
+            times the normal impulse, and at most what stops the rolling.
 
     Raises:
         SceneError: an argument is out of its range.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .common.checks import closest, count, listed, particles_fit
+from .common.checks import count, known_keys, particles_fit
 from .common.columns import read_columns, row_of
 from .common.validated import Count, Flag, Magnitude, NotNegativeCount, Part, Positive, Validated
 from .errors import SceneError
@@ -234,9 +234,7 @@ def job_of(document: dict[str, Any], text: str, path: Path, scene: Scene | None 
     Raises:
         SceneError: a key is unknown, missing or out of its range; the sentence begins with the key.
     """
-    for key in document:
-        if key not in _TABLES:
-            raise SceneError(f"{key}: unknown key, expected {listed(_TABLES)}{closest(key, _TABLES)}")
+    known_keys("", document, _TABLES)
     if "run" not in document:
         raise SceneError("run: expected a [run] table, got none; add [run] and until = ... below it")
     if "particles" in document and "body" in document:

@@ -8,7 +8,7 @@ from ..errors import SceneError
 from .options import Option, Positional
 from .shown import TrajectoryFile, table, written
 
-# More files than these are a sequence.
+# More files than this are printed as a range.
 _FEW = 2
 
 
@@ -71,7 +71,7 @@ def export(
 
 
 def _frames(text: str) -> slice | int:
-    """A number, or numbers and nothing between colons."""
+    """The number, or the slice of Python, that a text such as -1 or 2:10:4 stands for."""
     try:
         parts = [int(part) if part.strip() else None for part in text.split(":")]
         if len(parts) == 1 and parts[0] is not None:

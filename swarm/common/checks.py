@@ -9,7 +9,7 @@ import operator
 import os
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -318,6 +318,19 @@ def closest(value: Any, known: Iterable[str]) -> str:
     """The hint "; did you mean ...?" with the most similar name, or an empty text."""
     found = difflib.get_close_matches(value if isinstance(value, str) else shown(value), list(known), n=1, cutoff=0.5)
     return f"; did you mean {found[0]!r}?" if found else ""
+
+
+def known_keys(where: str, table: Iterable[str], known: Collection[str], hints: Mapping[str, str] = {}) -> None:
+    """Raise a `SceneError` for a key of a table that is none of these; `hints` are those of keys of other tables.
+
+    >>> known_keys("run.", {"untill": 1.0}, ("until", "every"))
+    Traceback (most recent call last):
+    swarm.errors.SceneError: run.untill: unknown key, expected 'until' and 'every'; did you mean 'until'?
+    """
+    for key in table:
+        if key not in known:
+            hint = hints.get(key) or closest(key, known)
+            raise SceneError(f"{where}{key}: unknown key, expected {listed(known) or 'none'}{hint}")
 
 
 def located(where: str, error: object) -> str:

@@ -12,7 +12,7 @@ from matplotlib import rc_context
 from matplotlib.text import Text
 
 from ..pictures import plots, style
-from ..pictures.drawn import Drawn as Chosen
+from ..pictures.drawn import Drawn
 from ..triangles.shape import Shape
 from ..triangles.shapes import shapes_of
 from ..words.amounts import amount, many
@@ -20,9 +20,9 @@ from ..words.content import Content
 
 # Of a graph, and of a picture of particles [inches]; pixels an inch of the latter, and most particles in it.
 _GRAPH, _PLACES, _DPI, _SHOWN = (5.0, 2.8), (4.4, 3.15), 240, 5000
-# Larger graphs, of very many frames, are pixels: a page is to be small.
+# Graphs with more characters of SVG than this, those of very many frames, are PNG, so that a page stays small.
 _LARGEST = 120_000
-# Colours of the light style, and what they are on the page.
+# Colours of the light style -> those of the page in their place.
 _COLOURS = {"#222222": "var(--ink)", "#8a8a8a": "var(--faint)", "#e6e6e6": "var(--grid)", "#ffffff": "var(--card)"}
 
 
@@ -47,7 +47,7 @@ def of_places(content: Content) -> list[PagePicture]:
 
 def _how_many(content: Content, name: str) -> str:
     """How many of the particles, or bodies, of a frame are drawn, where that is not all."""
-    drawn = Chosen(len(content.frames[name]), content.body, _SHOWN)
+    drawn = Drawn(len(content.frames[name]), content.body, _SHOWN)
     if drawn.shown == drawn.count:
         return ""
     return f": {many(drawn.shown)} of {many(drawn.count)} {drawn.noun} are drawn"
@@ -57,7 +57,7 @@ def _placed(content: Content, name: str, k: int, dark: bool) -> Any:
     """A figure of the particles of a frame."""
     figure = plots.picture_of_places(content, name, _shapes(content, k), _PLACES, _SHOWN)
     for text in figure.findobj(Text) if dark else ():
-        text.set_color(style.ink())  # its grey is that of a light background
+        text.set_color(style.ink())  # its grey is meant for a light background
     return figure
 
 
@@ -92,7 +92,7 @@ def svg(figure: Any, description: str) -> Markup:
         return _png(lambda dark: figure, description, variants=False)
     for colour, name in _COLOURS.items():
         text = re.sub(colour, name, text, flags=re.IGNORECASE)
-    # Of several pictures in a page no two things have one name.
+    # Names are unique among all pictures of a page.
     mine = f"g{hashlib.sha256((description + text).encode()).hexdigest()[:12]}-"
     text = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{mine}", text)
     head = re.search(r'viewBox="[^"]*"', text)
@@ -119,7 +119,7 @@ def _png(make: Any, description: str, variants: bool = True) -> Markup:
 
 
 def _smaller(buffer: io.BytesIO) -> bytes:
-    """A PNG of 256 colours, where that is smaller."""
+    """The PNG with 256 colours where that is smaller, else as it is."""
     from PIL import Image  # which matplotlib brings
 
     whole, made = buffer.getvalue(), io.BytesIO()

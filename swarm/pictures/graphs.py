@@ -36,6 +36,17 @@ def rows_of(count: int, width: float) -> list[int]:
     return [count // rows + (k >= rows - count % rows) for k in range(rows)]
 
 
+def cells_of(figure: Any, rows: list[int]) -> list[Any]:
+    """Axes of so many plots in each row of a figure."""
+    parts = figure.subfigures(len(rows), 1, squeeze=False).ravel()
+    return [
+        one
+        for part, number in zip(parts, rows, strict=True)
+        if number
+        for one in part.subplots(1, number, squeeze=False).ravel()
+    ]
+
+
 def lines(axes: Any, graph: series.Graph, drawn: Curves, limit: float | None = ROUND_OFF) -> None:
     """Draw the time series of one graph, by their names: (times [s], values). Rates have no value at the first frame.
 

@@ -86,9 +86,7 @@ def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.
         left, right = picture.subfigures(1, 2, width_ratios=[1.0 - part, part], squeeze=False).ravel()
         _places(_middle(left, aspect, scene.across()), content, last, shapes, most)
     above, below = right.subfigures(2, 1, height_ratios=[max(high - text, 0.1), text], squeeze=False).ravel()
-    cells = []
-    for part, number in zip(above.subfigures(len(rows), 1, squeeze=False).ravel(), rows, strict=True):
-        cells += list(part.subplots(1, number, squeeze=False).ravel()) if number else []
+    cells = graphs.cells_of(above, rows)
     _series(cells[: len(plots)], content, plots, rows[-1] - bool(spread))
     if spread:
         speeds.draw(cells[-1], content, spread)

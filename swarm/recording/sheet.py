@@ -98,10 +98,7 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
     _frames(top, playback, frames, found)
     picture.suptitle(title_of_sheet(playback), fontsize=12)
     picture.text(0.995, 0.005, f"drawn by {by.split(',')[0]}", ha="right", va="bottom", fontsize=7, color=drawing.LIGHT)
-    cells: list[Any] = []
-    for part, number in zip(middle.subfigures(len(rows), 1, squeeze=False).ravel(), rows, strict=True):
-        cells += list(part.subplots(1, number, squeeze=False).ravel()) if number else []
-    for axes, (group, curves) in zip(cells, plots.items(), strict=True):
+    for axes, (group, curves) in zip(graphs.cells_of(middle, rows), plots.items(), strict=True):
         graphs.lines(axes, series.GRAPHS[group].across(plane), curves)
     sentences.write_below(bottom, sentence_lines, heights[-1])
     return picture

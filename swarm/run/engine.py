@@ -41,7 +41,7 @@ _SHORT_FRAME = 0.05
 _LITTLE_WORK = 2e-4
 # A frame counts as slow to write above this part of the work in it.
 _MUCH_WRITING = 1.0 / 3.0
-# The phases that are no flight, with what slides in each; each phase has a kernel.
+# The phases other than flight, each of which has a kernel, and the walls that hold a particle that slides in it.
 _KINDS = {EVENT: None, CAREFUL: None, HELD: One(0.0), EDGE: Two(0.0, 0.0)}
 # In a frame in which particles slide a thread takes its share in so many parts, one after the other.
 _PARTS = 4
@@ -220,8 +220,8 @@ class Run(BaseRun):
         """(the number of threads of the pool that advance a frame, whether the caller's thread does too)."""
         work = self._pace * span if span > 0.0 else 0.0
         helps = work < _SHORT_FRAME * self._threads
-        # A thread that writes for as long as one computes has a processor of its own: three threads that share two
-        # processors wait for one another. And Python runs one thread at a time.
+        # Plain Python runs in one thread at a time. A thread that writes for as long as another computes needs a
+        # processor of its own: three threads that share two processors wait for one another.
         threads = 1 if self._tier.is_plain else max(1, self._threads - (writing > _MUCH_WRITING * work))
         return threads - helps if work > _LITTLE_WORK else 0, helps
 

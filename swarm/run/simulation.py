@@ -88,13 +88,13 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
             number, or an array of the same shape at every frame. The values are kept in float64, with the other
             observables; NaN means no value. The functions are tried at the start, before anything is compiled. They
             get all particles, also on a cluster, where the client calls them when the shards have ended.
-        counters: surfaces that count the particles that cross them and do not stop any, each a surface at rest or a
-            `Counter`, not with a contact_step. The motion has the same bits without them. With fixed steps a particle
-            crosses what is between the two ends of its step. A body crosses with its centre of mass. See
+        counters: surfaces that count the particles that cross them, and stop none; not with a contact_step. Each is a
+            surface at rest or a `Counter`. The motion has the same bits without them. With fixed steps a particle
+            crosses a counter that is between the two ends of a step. A body crosses with its centre of mass. See
             `Result.observables`.
         record_particles: the most particles recorded, evenly chosen.
         record_color: what the colour of a recorded particle shows, "speed" or "energy-error".
-        record_megabytes: largest size of the recording, above 0; of too many frames every k-th is recorded.
+        record_megabytes: largest size of the recording [MB], above 0; if all frames take more, every k-th is recorded.
         live: True to show the run in a Rerun viewer on this machine, or the URL of a viewer.
         threads: number of threads; None: all cores this process may use. Results have the same bits for any number.
         progress: True for a progress bar, or a function that is called with every `Frame`, which has the
@@ -112,14 +112,14 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
             there is neither a checkpoint nor a trajectory.
         walltime: seconds of wall time after which the run stops: it stops computing early enough to write the frames
             in its queue, and a checkpoint if it makes any. A compilation under way ends first.
-        compile: "auto": kernels that an earlier run compiled are used. With up to 2000 particles the others run in
-            plain Python, with the same bits, until the runs of the process have taken about a second in it; then, and
-            with more particles at once, they are compiled.
+        compile: "auto": kernels that an earlier run compiled are used. With up to 2000 particles the other kernels run
+            in plain Python, with the same bits, until the runs of this process have spent about a second there; then
+            they are compiled. With more particles they are compiled at once.
             "always": compiled from the start. "never": plain Python only.
         seed: seed of the random numbers of walls and sources, from 0 to 2**64 - 1: the same seed gives the same bits.
         cluster: where to run: None for this machine; "local:N", N worker processes on it; the address of a scheduler of
             Dask, such as "tcp://10.0.0.1:8786"; or a `distributed.Client`. Needs a trajectory, and the packages of the
-            extra "cluster". The particles are shards, each with files in the folder TRAJECTORY.shards, which the
+            extra "cluster". The particles are split into shards, with files in the folder TRAJECTORY.shards, which the
             trajectory needs; results have the same bits as without. A worker that dies is replaced, and its shard goes
             on from its checkpoint, by default of every 60 s.
         shards: number of shards on a cluster; None: one for each thread of its workers. A run of particles that meet,

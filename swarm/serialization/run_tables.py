@@ -6,7 +6,7 @@ from typing import Any
 
 import tomli_w
 
-from ..common.checks import closest, listed, located
+from ..common.checks import known_keys, located
 from ..errors import SceneError
 from ..scene import Scene
 from ..sources.source import Source
@@ -38,9 +38,7 @@ def _counter_of(table: Any, where: str) -> Counter:
         raise SceneError(
             f"{where}.surface: expected the table of a surface, got nothing; add surface = {{ kind = ... }}"
         )
-    for key in table:
-        if key not in keys:
-            raise SceneError(f"{where}.{key}: unknown key, expected {listed(keys)}{closest(key, keys)}")
+    known_keys(f"{where}.", table, keys)
     made = {key: surface_of(table[key], f"{where}.{key}") for key in keys if key in table}
     try:
         return Counter(**made)
@@ -66,10 +64,7 @@ def _place_of(given: Any, where: str, scene: Scene) -> Any:
         return given
     if "opening" not in given or "kind" in given:
         return opening_of(given, where)
-    keys = "surface", "part", "opening"
-    for key in given:
-        if key not in keys:
-            raise SceneError(f"{where}.{key}: unknown key, expected {listed(keys)}{closest(key, keys)}")
+    known_keys(f"{where}.", given, ("surface", "part", "opening"))
     if "surface" not in given:
         raise SceneError(f"{where}.surface: expected the number of a surface of the scene, got nothing")
     surface = _numbered(f"{where}.surface", given["surface"], scene.surfaces)

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.checks import closest, listed, located, one_of, shown
+from ..common.checks import known_keys, listed, located, one_of, shown
 from ..common.validated import bare, is_left_out
 from ..errors import SceneError
 from ..methods import ALL_METHODS, Method
@@ -214,10 +214,7 @@ def convert(table: Any, cls: type[T], where: str) -> T:
     if not isinstance(table, Mapping):
         raise SceneError(f"{where}: expected a table, got {table!r}")
     names = {field.metadata.get("key", field.name): field for field in kept_fields(cls)}
-    for key in table:
-        if key not in names:
-            hint = _ELSEWHERE.get(key) or closest(key, names)
-            raise SceneError(f"{where}.{key}: unknown key, expected {listed(names)}{hint}")
+    known_keys(f"{where}.", table, names, _ELSEWHERE)
     for key, field in names.items():
         if field.default is dataclasses.MISSING and key not in table:
             raise SceneError(f"{where}.{key}: expected {_type_name(field.type)}, got nothing; add {key} = ...")
@@ -307,10 +304,7 @@ def _law_of(table: Any, where: str) -> WallLaw | str:
     else:
         cls = ALL_LAWS[one_of(f"{where}.kind", table["kind"], ALL_LAWS)]
     given, needed = {name: value for name, value in table.items() if name != key}, cls._fields
-    for name in given:
-        if name not in needed:
-            expected = listed(needed) if needed else "none"
-            raise SceneError(f"{where}.{name}: unknown key, expected {expected}{closest(name, needed)}")
+    known_keys(f"{where}.", given, needed)
     for name in needed:
         if name not in given and name not in cls._field_defaults:
             raise SceneError(f"{where}.{name}: expected a number, got nothing; add {name} = ...")

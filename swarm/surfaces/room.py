@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -56,6 +56,12 @@ def has_volume(room: Room) -> bool:
         lambda points: gaps_of(room, points, 0.0),
         lambda i, points: gradient_of(room[i : i + 1], points),
     )
+
+
+def union_bounds(rooms: Iterable[Room]) -> Box:
+    """The corners of the box around rooms."""
+    low, high = zip(*map(room_bounds, rooms), strict=True)
+    return tuple(np.min(low, axis=0).tolist()), tuple(np.max(high, axis=0).tolist())
 
 
 def _ends(room: Room) -> tuple[Floats, Floats]:

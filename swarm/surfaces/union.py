@@ -23,7 +23,7 @@ from ..state import Floats
 from .area_samples import NEAR, AreaSample, Random, Region
 from .instant import distances, side_of
 from .part import checked_parts, handed_down, other_side
-from .room import Room, has_volume, lasting, may_have_volume, room_bounds
+from .room import Room, has_volume, lasting, may_have_volume, union_bounds
 from .surface import UNBOUNDED, Box, Surface
 from .surface import Place as Place
 
@@ -208,9 +208,7 @@ class Joined(Surface):
             return UNBOUNDED
         # The bounds do not include the motion of the whole.
         still = [[one.at_rest() if self.motion is not None else one for one in room] for room in self.rooms]
-        boxes = [room_bounds(lasting(room)) for room in still]
-        low, high = np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
-        return tuple(low.tolist()), tuple(high.tolist())
+        return union_bounds(map(lasting, still))
 
     def enclosing_box(self) -> Box:
         return self.bounds()

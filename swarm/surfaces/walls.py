@@ -66,7 +66,7 @@ class Touched(Record):
 
 
 class Walls(Record):
-    """The walls of a scene: its fields, those that are `Listed` last, all other walls, and then those of its unions.
+    """The walls of a scene: its fields, of which `Listed` ones are last, then all other walls, those of unions last.
 
     Methods of one wall (`_ASKED`) are methods here too, with the number of the wall before the other arguments.
     """
@@ -81,7 +81,7 @@ class Walls(Record):
 
         def __getattr__(self, name: str) -> Any: ...
 
-    # Whether some move in a motion that is not uniform, or are a field that moves.
+    # Whether a wall has a motion that is not uniform, or a field moves.
     accelerate = False
 
     def grown(self, radius):

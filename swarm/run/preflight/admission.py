@@ -25,10 +25,10 @@ from .knows import Asked, require_supported
 from .softness import depths_at_start
 from .starts import require_inside
 
-# The way ahead that shows on which side of a wall a flight begins, as a part of the size of the scene; and the part of
-# that way by which the place is outside where the flight begins in a tip.
+# The length of the way ahead that shows on which side of a wall a flight begins, as a part of the size of the scene. A
+# flight that begins in a tip is outside at its end by more than the second part of that way.
 _NEAR, _TIP = 1e-6, 1e-2
-# With a time so many runs ago float64 resolves a ten-thousandth of the run.
+# Of a time that is this many lengths of the run ago, float64 resolves a ten-thousandth of the run.
 _LONG_AGO = 1e12
 # A float does not hold larger whole numbers exactly; the numbers of images are multiplied by lengths.
 _MOST_CELLS = 2.0**53
@@ -171,7 +171,7 @@ def _require_normals(scene: Scene, particles: Particles) -> None:
         r, v = particles.position[:, on_wall], particles.velocity[:, on_wall]
         speed = np.sqrt((v**2).sum(axis=0))
         ahead = r + v * (step / np.where(speed > 0.0, speed, 1.0))
-        # Where there is a normal, what does not fly against it comes outside by a square of the way.
+        # Where the wall has a normal, a flight that does not go against it is outside by the square of the way at most.
         against = (gradient_of((surface,), r) * v).sum(axis=0) > 0.0
         slope = np.sqrt((surface.gradient(ahead) ** 2).sum(axis=0))
         lost = np.flatnonzero((speed > 0.0) & ~against & (gaps_of((surface,), ahead, 0.0)[0] > _TIP * step * slope))

@@ -3,16 +3,16 @@
 A face is a wall of a room. It is *seen*, that is, there, at places that are in no other room. An edge is where walls
 of two rooms cross; balls turn about it. A tip is a place where walls of three rooms meet. The *foot* of a ball is the
 place of a face or an edge that is nearest to it. On an edge Newton's method finds it: each step goes to the place
-nearest to the ball on the line in both tangent planes. Faces that edges join, and those in one place, are one wall.
+nearest to the ball on the line in both tangent planes. Faces that edges join are one wall; so are faces in one place.
 
 A soft ball at such a wall is pushed from its nearest place, by a gap g = R - d at the distance d. Two faces of a room
-may join in a corner around the balls, while both are of one wall, as the sides of a tunnel are by the rim of its mouth.
-There a ball has a spring at each: the gap of the wall is the root of the sum of the squares,
+may meet in a corner around the balls and be of one wall, as two sides of a tunnel are, joined by the rim of its mouth.
+A ball in such a corner has a spring at each face: the gap of the wall is the root of the sum of the squares,
 
     g^2 = g(nearest)^2 + sum over corners of (g(one)^2 - g(corner)^2)                                             (1)
 
-with the farther one of both faces, and the nearest place of the corner. The distances are those to all places of a face
-with its edges, so that g goes on without a jump where a ball leaves the tunnel: there both are as far as the corner.
+where `one` is the farther of the two faces, and `corner` its nearest place. The distance from a face is that from all
+its places and its edges. So g has no jump where a ball leaves the tunnel: there both faces are as far as the corner.
 
 Flights of hard balls take safe steps. Where the foot on a face is seen, a flight is free until it meets the parallel
 surface. Near an edge it is free for a time that follows from the curvature of the edge. A hidden face is not met before
@@ -31,7 +31,7 @@ from ..shapes.plane import PlaneNumbers
 from ..shapes.slab import SlabNumbers
 from ..time_of_impact import march, rising
 
-# The most steps of Newton's method to an edge; one that is no longer than this round-off of a place is the last.
+# The most steps of Newton's method to an edge. A step no longer than this part of a place, its round-off, is the last.
 _SWEEPS, _STILL = 60, 4.0 * EPSILON
 # Edges are found up to so many radii away.
 _FAR = 4.0
@@ -47,7 +47,7 @@ class RoomFace(Record):
     wall: Any
     rooms: Any  # the number of the room, twice
     round: Any = None  # the smallest radius of curvature [m]; None where it depends on the place
-    slope: float = 0.0  # how fast it decreases at most along the wall, a length per length
+    slope: float = 0.0  # its steepest decrease along the wall, a length per length
 
 
 class RoomEdge(Record):
@@ -73,7 +73,7 @@ class RoomEdge(Record):
 
 
 class RoomSide(Record):
-    """A face that makes a corner with another one, and the edges that it ends at."""
+    """A face that makes a corner with another one, and the edges at which it ends."""
 
     face: RoomFace
     edges: Any
@@ -85,7 +85,7 @@ class RoomCorner(Record):
     line: RoomEdge  # where they cross
     one: RoomSide
     other: RoomSide
-    ends: Any  # places where that ends at another room
+    ends: Any  # places where the line ends at another room
 
 
 class Rim(Record):
@@ -175,15 +175,21 @@ def nearest(wall, r):
     """(distance, place) of the place of a wall that is nearest to r; edges beyond `_FAR` radii are left out."""
     best, place = wall.most, r
     for face in wall.faces:
-        foot = r - face.wall.distance(r) * outward(face.wall, r)
-        away = norm(foot - r)
-        better = is_seen(wall.rooms, face.rooms, foot, wall.slack) & (away < best)
-        best, place = select(better, away, best), either(better, foot, place)
+        best, place = _or_on_face(wall, face, r, (best, place))
     for edge in wall.edges:
         best, place = _or_on_edge(wall, edge, r, (best, place))
     for tip in wall.tips:
         best, place = _or_at(tip, r, (best, place))
     return best, place
+
+
+def _or_on_face(wall, face, r, known):
+    """(distance, place) of the nearest place of a face, or of one that is known and no farther."""
+    best, place = known
+    foot = r - face.wall.distance(r) * outward(face.wall, r)
+    away = norm(foot - r)
+    better = is_seen(wall.rooms, face.rooms, foot, wall.slack) & (away < best)
+    return select(better, away, best), either(better, foot, place)
 
 
 def _or_on_edge(wall, edge, r, known):
@@ -229,7 +235,7 @@ def _pressed(wall, r):
 
 
 def _by_depth(wall, r0, r1):
-    """The mean of the gradients at both ends, by how deep they are: outside there is that of one spring."""
+    """The mean of the gradients at both ends of a step, by their depths; alike where neither end is in the wall."""
     (g0, n0), (g1, n1) = _pressed(wall, r0), _pressed(wall, r1)
     a, b = max(g0, 0.0), max(g1, 0.0)
     is_in = a + b > 0.0
@@ -250,11 +256,7 @@ def _in_corner(wall, corner, r):
 
 def _on_side(wall, side, r, known):
     """(distance, place) of the nearest place of a face with its edges, no farther than a place that is known."""
-    best, place = known
-    foot = r - side.face.wall.distance(r) * outward(side.face.wall, r)
-    away = norm(foot - r)
-    better = is_seen(wall.rooms, side.face.rooms, foot, wall.slack) & (away < best)
-    best, place = select(better, away, best), either(better, foot, place)
+    best, place = _or_on_face(wall, side.face, r, known)
     for edge in side.edges:
         best, place = _or_on_edge(wall, edge, r, (best, place))
     return best, place
@@ -274,7 +276,7 @@ def at_least(wall, r):
 
 
 def _at_least_to(wall, face, r):
-    """The same of a face: where its foot is hidden, of what is seen beside it, which may have no edge there."""
+    """The same of a face. Where its foot is hidden, the seen part is beside it, perhaps without an edge there."""
     away, n, flat = face.wall.distance(r), outward(face.wall, r), isinstance(face.wall, FLAT)
     depth = max(hidden(wall.rooms, face.rooms, r - away * n, n if flat else ZERO), 0.0)
     return math.sqrt(away * away + depth * depth) if flat else max(abs(away), depth - abs(away))

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...kernel.limits import EPSILON
 from ...kernel.vector import ZERO, Vec, cross, dot, norm
-from ..room import room_bounds
+from ..room import room_bounds, union_bounds
 from ..shapes.box import Box
 from ..shapes.cone import Cone
 from ..shapes.cylinder import Cylinder
@@ -81,9 +81,7 @@ class JoinedRooms(Surface):
         return float(max(one.extent() for room in self.rooms_of for one in room))
 
     def bounds(self) -> Bounds:
-        boxes = [room_bounds(room) for room in self.rooms_of]
-        low, high = np.min([low for low, _high in boxes], axis=0), np.max([high for _low, high in boxes], axis=0)
-        return tuple(low.tolist()), tuple(high.tolist())
+        return union_bounds(self.rooms_of)
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         return np.asarray(np.min([np.max(gaps, axis=0) for gaps in self._gaps(points, time)], axis=0))

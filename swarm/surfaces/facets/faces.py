@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from ...state import Floats, Indices
+from .mending import parts_of
 
 # The sine of an angle between triangles that are in one plane, and how far from that corners may be, of the size.
 _FLAT, _OFF = 1e-5, 1e-6
@@ -68,7 +69,7 @@ def _join_flat(groups: _Groups, planes: Indices, corners: Floats, normals: Float
         return _hull(corners[some].reshape(-1, 3), normals[some[0]]) <= (1.0 + _WIDER) * float(areas[some].sum())
 
     parts = {i: [i] for i in range(len(planes))}
-    whole = [part for part in _parts_of(planes) if len(part) > 1]
+    whole = [part for part in parts_of(planes) if len(part) > 1]
     hollow = set()
     for part in whole:
         if is_convex(part.tolist()):
@@ -80,12 +81,6 @@ def _join_flat(groups: _Groups, planes: Indices, corners: Floats, normals: Float
         a, b = groups.root(one), groups.root(other)
         if a != b and int(planes[one]) in hollow and is_convex(parts[a] + parts[b]):
             groups.parent[b], parts[a] = a, parts[a] + parts[b]
-
-
-def _parts_of(numbers: Indices) -> list[Indices]:
-    """Where each of the numbers is."""
-    order = np.argsort(numbers, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
 
 
 def _hull(points: Floats, normal: Floats) -> float:
@@ -126,7 +121,7 @@ def _join_edges(groups: _Groups, planes: Indices, corners: Floats, normals: Floa
     roots = np.array([groups.root(i) for i in range(len(planes))])
     # Of each its planes as rows (normal, offset), of a flat one the first triangle's; its corners; and their numbers.
     bodies: dict[int, tuple[Floats, Floats, set[int]]] = {}
-    for part in _parts_of(roots):
+    for part in parts_of(roots):
         n = normals[part[:1]]
         row = np.concatenate([n, (n @ corners[part[0]].T).mean(axis=1, keepdims=True)], axis=1)
         points = np.unique(corners[part].reshape(-1, 3), axis=0)

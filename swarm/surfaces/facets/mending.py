@@ -211,9 +211,13 @@ def components(pairs: Indices, count: int) -> Indices:
 
 def groups_of(pairs: Indices, count: int) -> list[Indices]:
     """Which of so many hang together, by these pairs (P, 2)."""
-    label = components(pairs, count)
-    order = np.argsort(label, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+    return parts_of(components(pairs, count))
+
+
+def parts_of(numbers: Indices) -> list[Indices]:
+    """Where each of the numbers is."""
+    order = np.argsort(numbers, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
 
 
 def neighbours(triangles: Indices) -> tuple[Indices, Indices]:

@@ -1,8 +1,8 @@
-"""Flat faces in one place: of two surfaces with the same side, and of solids that stand flush on other walls.
+"""Flat faces of two surfaces in one plane: surfaces on the same side of it, and solids that stand flush on walls.
 
-Between a solid and a wall that it only touches is a gap of no width, into which round-off leads points. So the face of
-a solid that lies within what other walls keep from particles is moved into that by a small distance, the *reach*, as
-the common faces of rooms are in `seams`: what particles may be in does not change.
+A solid that only touches a wall leaves a gap of no width, into which round-off leads points. So a face of a solid that
+lies wholly on other walls is moved a small distance, the *reach*, into the region that these keep from particles.
+`seams` does the same with the common faces of rooms. The region of the particles does not change.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -17,7 +17,7 @@ from ..instant import are_there_together, distances, side_of
 from ..surface import Surface
 from .seams import ENOUGH, FAR, OUTSIDE, PLACES, Face, faces_of
 
-# Of the size: the reach, which is more than those digits, and than what counts as touching a wall.
+# The reach, as a part of the size of the scene: more than `DIGITS` resolve, and than what counts as touching a wall.
 _REACH = 2e-9
 
 
@@ -37,7 +37,7 @@ def pairs_in_one_place(
     Args:
         surfaces: of a scene.
         size: their size [m].
-        matters: whether two surfaces are asked for; and whether back to back.
+        matters: whether a pair is wanted, given both surfaces and whether their faces are back to back.
     """
     each = [_planes(one) for one in surfaces]
     if not each:
@@ -62,7 +62,7 @@ def pairs_in_one_place(
 def _planes(surface: Surface) -> Floats:
     """The planes of its flat faces, as rows of unit normals out of its admissible side, and offsets (n, 4) [m].
 
-    Of a face that is not flat they are not a number.
+    A face that is not flat has a row of NaN.
     """
     if len(flat := surface.flat_faces()):
         return side_of(surface) * flat
@@ -105,7 +105,7 @@ def flush_faces(surfaces: Sequence[Surface]) -> dict[tuple[int, int], float]:
 
 
 def extended(surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
-    """Surfaces of a scene, of which solids reach into the walls that they stand on."""
+    """The surfaces of a scene, with solids that reach into the walls on which they stand."""
     made = list(surfaces)
     for (i, a), by in flush_faces(surfaces).items():
         longer = face_of(made[i], a).longer
@@ -132,10 +132,10 @@ def _apart(face: Face, mate: Face) -> float:
 
 
 def _is_within(solid: Surface, number: int, others: Sequence[Surface], size: float) -> bool:
-    """Whether what a solid gains where one of its faces is moved out is deep in what others keep from particles.
+    """Whether a solid with one face moved out grows only into the region that other walls keep from particles.
 
-    At the rim of the face a wall of another one must not go on from one of the solid: round-off would lead points that
-    slide on both against the side of what is gained.
+    At the rim of the face no other wall may continue a side of the solid: round-off would lead points that slide on
+    both against the side of the grown part.
     """
     random, most = np.random.default_rng(1), FAR * size
     solid, others = solid.at_rest(), [one.at_rest() for one in others]
@@ -159,7 +159,7 @@ def _places_of(solid: Surface, number: int, size: float, random: np.random.Gener
 
 
 def _depths(walls: Sequence[Surface], points: Floats) -> Floats:
-    """How far points (3, N) are out of the admissible side of the wall that keeps them out most [m]."""
+    """The largest distance of points (3, N) out of the admissible side of any of these walls [m]."""
     with np.errstate(all="ignore"):
         return np.asarray(np.max([side_of(one) * distances(one, points) for one in walls], axis=0))
 
@@ -176,7 +176,7 @@ def _share_a_place(first: tuple[Surface, int], second: tuple[Surface, int], size
         return False
     random = np.random.default_rng(0).random((3, PLACES))
     tried = [face_of(*second).onto(least[:, None] + (most - least)[:, None] * random)]
-    # Feet of a table are small in the box around it.
+    # Points in the box around all faces would miss small ones, such as the feet of a table.
     tried += [known[0] for end, a in (first, second) if (known := end.places_of_flat_face(a, PLACES)) is not None]
     points = np.concatenate(tried, axis=1)
     with np.errstate(all="ignore"):

@@ -101,12 +101,13 @@ def _rows(
             for times in dict.fromkeys(volume.present for volume in alike):
                 last = number if was_there(times, moment) else first
                 at_once = [volume for volume in alike if volume.present == times]
-                rows.append(kind(_taken(at_once, together), float(first), float(last)))
+                rows.append(kind(volumes_in(at_once, together), float(first), float(last)))
         made += reversed(by_kind(rows, lambda row: row.volumes))
     return tuple(made)
 
 
-def _taken(volumes: Sequence[Surface], together: bool = False) -> tuple[Any, ...]:
+def volumes_in(volumes: Sequence[Surface], together: bool = False) -> tuple[Any, ...]:
+    """Volumes as kernels take them; with `together`, several of one kind are a field."""
     fields, rest = _fields_of(volumes) if together else ([], volumes)
     alone = reversed(by_kind(rest, lambda volume: volume.walls()))
     return (
@@ -138,12 +139,7 @@ def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Sur
     found: list[Surface] = []
     for k, opening in enumerate(surface.open_volumes()):
         where = f"{name}.openings[{k}]"
-        if isinstance(opening, Outlined):
-            raise SceneError(
-                f"{where} must be a volume of surfaces such as swarm.Box, got {type(opening).__name__}; give boxes or "
-                "cylinders"
-            )
-        required.require_description([opening], where)
+        _require_volume(opening, where)
         if not reaches(surface, opening):
             raise SceneError(
                 f"{where} must reach the wall that it opens, got {opening}, in which no point of {name} "
@@ -159,18 +155,18 @@ def volumes_of_counter(volume: Surface, period: Lengths | None, name: str) -> tu
     Raises:
         SceneError: it has no phi that is known everywhere, or it does not go with the period.
     """
+    _require_volume(volume, name)
+    return (volume,) if period is None else tuple(_images(volume, period, name))
+
+
+def _require_volume(volume: Surface, name: str) -> None:
+    """Raise a `SceneError` where a surface has no phi that is known everywhere."""
     if isinstance(volume, Outlined):
         raise SceneError(
             f"{name} must be a volume of surfaces such as swarm.Box, got {type(volume).__name__}; give a box or a "
             "cylinder"
         )
     required.require_description([volume], name)
-    return (volume,) if period is None else tuple(_images(volume, period, name))
-
-
-def volumes_in(volumes: Sequence[Surface]) -> tuple[Any, ...]:
-    """Volumes as kernels take them."""
-    return _taken(volumes)
 
 
 def _images(opening: Surface, period: Lengths, name: str) -> list[Surface]:
