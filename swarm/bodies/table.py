@@ -270,8 +270,3 @@ def _contacts(rows: Floats) -> list[Any]:
     numbers = rows.argmax(axis=1)
     same = (rows == np.eye(rows.shape[1])[numbers]).all()
     return list(numbers.tolist() if same else rows.tolist())
-
-
-def bodies_of_run(body: Body, position: Floats, velocity: Floats) -> Bodies:
-    """Bodies that a run left, checked as those of a start but for their velocities."""
-    return Bodies.of_run(body, position, velocity)

@@ -244,7 +244,7 @@ class Trajectory(Stored):
             position, velocity = (
                 rows.reshape(shape)[..., there] for rows in (points.position, points.velocity)
             )  # fmt: skip
-            bodies: Bodies = view("bodies").bodies_of_run(body, position, velocity)
+            bodies: Bodies = view("bodies").Bodies.of_run(body, position, velocity)
         return bodies
 
     def impacts(self, k: int) -> NDArray[np.int64]:

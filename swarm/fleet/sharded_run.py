@@ -59,7 +59,7 @@ class Sharded(Session):
             return
         elif self._resumes and self._trajectory.exists():
             self._refuse_to_restart(task.options.until)
-        elif (folder := shards.folder_of(self._trajectory)).exists():
+        elif (folder := paths.shards_of(self._trajectory)).exists():
             raise SceneError(
                 f"{folder} holds the shards of another run; resume that with --resume, choose another name for the "
                 "trajectory, or overwrite it (--overwrite, overwrite=True)"
@@ -86,7 +86,7 @@ class Sharded(Session):
 
     def begin(self, task: Task, count: int) -> tuple[Path, list[int]]:
         """The folder of the shards and their bounds, those of the session before or so many new ones."""
-        folder = shards.folder_of(self._trajectory)
+        folder = paths.shards_of(self._trajectory)
         if self._bounds is None:
             self._bounds = shards.bounds_of(task.count, count)
             shards.clear(folder)
@@ -105,7 +105,7 @@ class Sharded(Session):
     def finish(self) -> None:
         """Remove what only an unfinished run needs."""
         paths.checkpoint_of(self._trajectory).unlink(missing_ok=True)
-        shards.tidy(shards.folder_of(self._trajectory), len(self._bounds) - 1)
+        shards.tidy(paths.shards_of(self._trajectory), len(self._bounds) - 1)
 
 
 def carry_out(task: Task, session: Sharded) -> RunEnd:

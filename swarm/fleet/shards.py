@@ -50,11 +50,6 @@ class Whole(NamedTuple):
     balls: tuple[Any, ...]  # the sources, where they are of balls
 
 
-def folder_of(trajectory: Path) -> Path:
-    """The folder of the shards of a trajectory."""
-    return paths.shards_of(trajectory)
-
-
 def file_of(folder: Path, k: int) -> Path:
     """The trajectory of shard k."""
     return folder / f"{k:04}.h5"

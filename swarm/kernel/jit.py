@@ -118,5 +118,5 @@ def allocating(function: F, body: Any) -> F:
     """A helper of the user's, which may make arrays; kernels call `body` in its place."""
     if not cache.is_disabled():
         function.in_kernels = body  # type: ignore[attr-defined]  # what the digest of its code is of
-        defer(lambda machine_code: machine_code.prepare_allocating(function, body))
+        defer(lambda machine_code: machine_code.prepare_helper(function, body=body))
     return function

@@ -105,14 +105,10 @@ def kernel_of(kernel: Kernel) -> Any:
     return cached(function, {**_KERNEL, "pipeline_class": pipeline}, calling(traced))
 
 
-def prepare_helper(function: Any, is_outlined: bool) -> None:
-    """Let traces and Numba call a helper."""
-    prepare(function, _OUTLINE if is_outlined else _INLINE, outlined=is_outlined)
-
-
-def prepare_allocating(function: Any, body: Any) -> None:
-    """Let them call `body` in place of a function, which may make arrays."""
-    prepare(function, _ALLOCATING, outlined=False, body=body)
+def prepare_helper(function: Any, is_outlined: bool = False, body: Any = None) -> None:
+    """Let traces and Numba call a helper, or in its place `body`, which may make arrays."""
+    flags = _ALLOCATING if body is not None else _OUTLINE if is_outlined else _INLINE
+    prepare(function, flags, outlined=is_outlined, body=body)
 
 
 @typeof_impl.register(Kernel)

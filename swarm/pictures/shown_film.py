@@ -1,15 +1,14 @@
 """A film that shows itself in a notebook: its file is a part of the notebook."""
 
 import base64
-import os
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileError, SceneError
+from ..errors import SceneError
 from ..files import marks, paths
-from ..files.sources import cause
+from ..files.replaced import replaced
 from . import film
 
 # Notebooks with more base64 than this hang when they are opened, saved or scrolled.
@@ -69,14 +68,8 @@ class Film:
                 f"that ends so, got {path}; trajectory.animate writes the other kind"
             )
         marks.check_target(target, overwrite, "film")
-        part = paths.part_of(target)
-        try:
-            part.write_bytes(self.content)
-            os.replace(part, target)
-        except OSError as error:
-            raise FileError(f"cannot write the film {target}: {cause(error)}") from error
-        finally:
-            part.unlink(missing_ok=True)
+        with replaced(target, "film") as file:
+            file.write(self.content)
         return target
 
     def _megabytes(self) -> str:

@@ -6,6 +6,7 @@ capability that is not supported; all other pairs are. `require_supported` raise
 before anything is compiled.
 """
 
+import functools
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -84,37 +85,26 @@ def _of_walls(name: str, without: Any) -> Callable[[Asked], Found]:
     def found(asked: Asked) -> Found:
         for i, wall in asked.scene.pieces.owned():
             if (got := getattr(wall, name)) != without:
-                shown = f"{got:g}" if isinstance(got, float) else got
-                yield {"i": i, "got": shown, "count": len(got) if isinstance(got, tuple) else 1}
+                yield {"i": i, **_shown(got)}
 
     return found
 
 
-def _option(name: str) -> Callable[[Asked], Found]:
-    def found(asked: Asked) -> Found:
-        if got := getattr(asked.options, name):
-            yield {"got": got, "count": len(got) if isinstance(got, tuple) else 1}
-
-    return found
-
-
-def _of_scene(name: str) -> Callable[[Asked], Found]:
-    def found(asked: Asked) -> Found:
-        if (got := getattr(asked.scene, name)) is not None:
-            yield {"got": got}
-
-    return found
-
-
-def _argument(name: str, *without: Any) -> Callable[[Asked], Found]:
-    """A function that finds a method with another value of an argument than these; the first is its default."""
+def _given(path: str, *without: Any) -> Callable[[Asked], Found]:
+    """A function that finds another value than these at a path of attributes; the first is that of a missing one."""
+    without = without or (None, False, ())
 
     def found(asked: Asked) -> Found:
-        got = getattr(asked.method, name, without[0])
+        got = functools.reduce(lambda part, name: getattr(part, name, without[0]), path.split("."), asked)
         if got not in without:
-            yield {"got": f"{got:g}" if isinstance(got, float) else got}
+            yield _shown(got)
 
     return found
+
+
+def _shown(got: Any) -> dict[str, Any]:
+    """A value, and how many it is, as fields of a sentence."""
+    return {"got": f"{got:g}" if isinstance(got, float) else got, "count": len(got) if isinstance(got, tuple) else 1}
 
 
 def _where(
@@ -230,18 +220,6 @@ def _period(asked: Asked) -> Found:
         yield {"got": asked.scene.period}
 
 
-def _duration(asked: Asked) -> Found:
-    pairs = asked.scene.pairs
-    if pairs is not None and pairs.contact_duration is not None:
-        yield {"got": f"{pairs.contact_duration:g}"}
-
-
-def _rolls(asked: Asked) -> Found:
-    pairs = asked.scene.pairs
-    if pairs is not None and pairs.rolling > 0.0:
-        yield {"got": f"{pairs.rolling:g}"}
-
-
 def _cuts_at_impacts(asked: Asked) -> str | None:
     """The argument of `AugmentedLagrangian` that cuts its steps at impacts with walls at rest; None without it."""
     if _takes_rooms(asked):
@@ -262,7 +240,7 @@ def _gravity_at_impacts(asked: Asked) -> Found:
 def _members_in_fixed_steps(asked: Asked) -> Found:
     method: Any = asked.method
     is_fixed = getattr(method, "on_unconverged", "") == "impact" and not getattr(method, "adaptive", True)
-    yield from _option("member_impacts")(asked) if is_fixed else ()
+    yield from _given("options.member_impacts")(asked) if is_fixed else ()
 
 
 def _cavities(asked: Asked) -> Found:
@@ -275,18 +253,8 @@ def _lossy_cavities(asked: Asked) -> Found:
     yield from (one for one in _cavities(asked) if one["got"].restitution != 1.0 or one["got"].friction != 0.0)
 
 
-def _part_of_particles(asked: Asked) -> Found:
-    if asked.options.frames not in ("all", "none"):
-        yield {"got": asked.options.frames}
-
-
 def _on_cluster(found: Callable[[Asked], Found]) -> Callable[[Asked], Found]:
     return _where(lambda asked: asked.options.cluster is not None, found)
-
-
-def _several_shards(asked: Asked) -> Found:
-    if (got := asked.options.shards) is not None and got > 1:
-        yield {"got": got}
 
 
 def _recorded(asked: Asked) -> Found:
@@ -396,7 +364,7 @@ CAPABILITIES = (
     Capability("no step", _where(lambda asked: getattr(asked.method, "dt", None) is None), {
         (BODIES,): _NO_METHOD,
     }, True),
-    Capability("source", _option("sources"), {
+    Capability("source", _given("options.sources"), {
         (SOFT_BODIES, PAPER_BODIES): Refusal(
             "sources must be left out with bodies and {method}, got {count}: a body is born at any time, not at the "
             "end of a step", "use Impact(dt=...)",
@@ -406,12 +374,12 @@ CAPABILITIES = (
             "of a step", _TO_EXACT,
         ),
     }),
-    Capability("log of impacts", _option("impacts"), {
+    Capability("log of impacts", _given("options.impacts"), {
         (SOFT_BODIES, PAPER_BODIES, BASELINE, OTHER_POINTS): Refusal(
             "impacts must be None with {method}, got {got}: its contacts last for a time", "use Impact"
         ),
     }),
-    Capability("counter", _option("counters"), {
+    Capability("counter", _given("options.counters"), {
         (OTHER_POINTS,): Refusal(
             "counters must be left out with {method}, got {count}: a counter follows flights, not steps", "use Impact()"
         ),
@@ -469,43 +437,43 @@ CAPABILITIES = (
             "not converge take too long there", "use Penalty or Impact",
         ),
     }, True, within="motion"),
-    Capability("dt of Impact", _argument("dt", None), {
+    Capability("dt of Impact", _given("method.dt", None), {
         (*_RIGID_POINTS, *_RIGID_BALLS): Refusal(
             "dt of Impact must be left out with particles, got {got}: it is the step of bodies", "leave it out"
         ),
     }, True),
-    Capability("contact_step", _argument("contact_step", 0.0), {
+    Capability("contact_step", _given("method.contact_step", 0.0), {
         (BODIES,): Refusal("contact_step must be 0 with bodies, got {got}: their impacts are exact", "leave it out"),
         _RIGID_BALLS: Refusal(
             "contact_step must be 0 where particles have a radius, got {got}: an impact of hard balls takes no time",
             "leave it out",
         ),
     }, True),
-    Capability("gradient", _argument("gradient", "composite"), {
+    Capability("gradient", _given("method.gradient", "composite"), {
         (SOFT_BODIES, PAPER_BODIES): Refusal(
             'gradient of {method} must be "composite" with bodies, got "{got}"', "leave it out"
         ),
         (GRAINS,): Refusal('gradient must be "composite" where particles have a radius, got "{got}"', "leave it out"),
     }, True),
-    Capability("acceleration", _argument("acceleration", "none"), {
+    Capability("acceleration", _given("method.acceleration", "none"), {
         (PAPER_BODIES,): Refusal('acceleration of {method} must be "none" with bodies, got "{got}"', "leave it out"),
     }, True),
-    Capability("contact_start", _argument("contact_start", "impact"), {
+    Capability("contact_start", _given("method.contact_start", "impact"), {
         (PAPER_BODIES,): Refusal('contact_start of {method} must be "impact" with bodies, got "{got}"', "leave it out"),
     }, True),
-    Capability("exponent of multipliers", _argument("exponent", 1.0), {
+    Capability("exponent of multipliers", _given("method.exponent", 1.0), {
         (PAPER_BODIES,): Refusal(
             "exponent of AugmentedLagrangian must be 1 with bodies, got {got}: its loop does not converge for another "
             "one", "leave it out, or use Penalty",
         ),
     }, True),
-    Capability("fixed steps of multipliers", _argument("adaptive", True), {
+    Capability("fixed steps of multipliers", _given("method.adaptive", True), {
         (PAPER_BODIES,): Refusal(
             "adaptive of AugmentedLagrangian must be True with bodies, got {got}: a loop that does not start from the "
             "wall does not converge", "give adaptive=True, or use Penalty",
         ),
     }, True),
-    Capability("impacts of what did not converge", _argument("on_unconverged", "raise", "count"), {
+    Capability("impacts of what did not converge", _given("method.on_unconverged", "raise", "count"), {
         (PAPER_BODIES,): Refusal(
             'on_unconverged must be "raise" or "count" with bodies, got "{got}"', "leave it out, or use Impact(dt=...)"
         ),
@@ -527,7 +495,7 @@ CAPABILITIES = (
             "meet one another", "give walls, or give the particles a radius",
         ),
     }, True),
-    Capability("law of pairs", _of_scene("pairs"), {
+    Capability("law of pairs", _given("scene.pairs"), {
         _ALONE: Refusal(
             "pairs must be None where particles have no radius, got {got}: points do not meet one another",
             "give the particles a radius, or leave pairs out",
@@ -537,7 +505,7 @@ CAPABILITIES = (
             "leave it out, or use particles with a radius",
         ),
     }),
-    Capability("contact duration", _duration, {
+    Capability("contact duration", _given("scene.pairs.contact_duration", None), {
         (GRAINS,): Refusal(
             "pairs.contact_duration must be None with Penalty, got {got} s: its contacts last as long as particles "
             "overlap", "leave it out, or use Impact",
@@ -549,7 +517,7 @@ CAPABILITIES = (
             "give the particles a radius",
         ),
     }),
-    Capability("plane", _of_scene("plane"), {
+    Capability("plane", _given("scene.plane"), {
         (SOFT_BODIES, PAPER_BODIES): Refusal(
             'plane must be None with bodies and {method}, got "{got}"', "use Impact(dt=...), or leave it out"
         ),
@@ -576,7 +544,7 @@ CAPABILITIES = (
         _RIGID_BALLS: _without_rolling("surfaces[{i}].rolling", _AT_AN_INSTANT),
         _EVERY_BODY: _without_rolling("surfaces[{i}].rolling", "bodies, which turn by the forces at their points"),
     }),
-    Capability("rolling of pairs", _rolls, {
+    Capability("rolling of pairs", _given("scene.pairs.rolling", 0.0), {
         _RIGID_BALLS: _without_rolling("pairs.rolling", _AT_AN_INSTANT),
     }, within="law of pairs"),
     Capability("temperature", _of_walls("temperature", None), {
@@ -694,7 +662,7 @@ CAPABILITIES = (
             "cavities[{k}] must be elastic with {method}, got {got}", "use Impact(dt=...)"
         ),
     }),
-    Capability("impacts on members", _option("member_impacts"), {}),
+    Capability("impacts on members", _given("options.member_impacts"), {}),
     Capability("impacts on members of a field", _where(lambda asked: asked.options.member_impacts, _fields), {
         (SOFT,): Refusal(
             "member_impacts must be False with {method} at surfaces[{i}], got True: a soft wall is one spring, in "
@@ -715,12 +683,12 @@ CAPABILITIES = (
             "have impacts on several walls", 'use adaptive=True, or on_unconverged="count"',
         ),
     }, True),
-    Capability("frames of some particles", _part_of_particles, {
+    Capability("frames of some particles", _given("options.frames", "all", "none"), {
         _EVERY_BODY: Refusal(
             'frames must be "all" or "none" with bodies, got {got}: a body is written as a whole', 'give frames="all"'
         ),
     }),
-    Capability("shards", _several_shards, {
+    Capability("shards", _given("options.shards", None, 1), {
         _EVERY_BALL: Refusal(
             "shards must be 1 or left out where particles have a radius, got {got}: particles that meet one another "
             "cannot be in different shards", "leave it out",
@@ -741,12 +709,12 @@ CAPABILITIES = (
             "make the recording from the trajectory: swarm record RUN.h5 -o OUT.rrd",
         ),
     }),
-    Capability("cluster and log of impacts", _on_cluster(_option("impacts")), {
+    Capability("cluster and log of impacts", _on_cluster(_given("options.impacts")), {
         ENGINES: Refusal(
             "impacts must be None with a cluster, got {got}: its shards keep no common log", "run without a cluster"
         ),
     }),
-    Capability("cluster and sources of bodies", _on_cluster(_option("sources")), {
+    Capability("cluster and sources of bodies", _on_cluster(_given("options.sources")), {
         _EVERY_BODY: Refusal(
             "sources must be left out with bodies on a cluster, got {count}: its shards have the bodies of the start",
             "run without a cluster",
@@ -773,12 +741,11 @@ def sentence(engine: str, capability: str) -> str | None:
     return one.sentence(engine) or (sentence(engine, one.within) if one.within else None)
 
 
-def _refused_by(engine: str) -> list[tuple[Capability, str]]:
-    return [(one, text) for one in CAPABILITIES if (text := one.sentence(engine)) is not None]
-
-
 # Engine -> the capabilities that it does not support, in the order of `CAPABILITIES`, each with its sentence.
-_REFUSED = {engine: _refused_by(engine) for engine in (*ENGINES, OTHER_POINTS, OTHER_BALLS, OTHER_BODIES)}
+_REFUSED = {
+    engine: [(one, text) for one in CAPABILITIES if (text := one.sentence(engine)) is not None]
+    for engine in (*ENGINES, OTHER_POINTS, OTHER_BALLS, OTHER_BODIES)
+}
 
 
 def require_supported(asked: Asked) -> None:
