@@ -5,7 +5,7 @@ from typing import Any
 from ..fleet.plan import COMBINE, MAKERS, WAYS
 from ..scene_file import SWEEP
 from ..surfaces import ALL_FIELDS, ALL_SURFACES
-from .keys import CODE, INTEGER, Form, Table, TableKey, either, listed, named, tables
+from .keys import CODE, INTEGER, Form, Table, either, listed, named, tables
 
 # JSON Schema, draft 2020-12.
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -59,8 +59,11 @@ def schema_of(sweep: bool = False) -> Form:
 
 def _definitions(known: dict[tuple[str, str], Table]) -> Form:
     common = known["surface", ""]
-    # Of what is no wall; a rotation is of its place.
-    bare: Form = {key.name: _only_default(key) for key in common.keys if key.name != "rotation"}
+    # What is no wall may have no other value of these than the default; its rotation is of its place.
+    bare: Form = {
+        key.name: {"const": key.default} if isinstance(key.default, float) else False
+        for key in common.keys if key.name != "rotation"
+    }  # fmt: skip
     group = {key.name: key.form for key in common.keys if key.name in _OF_GROUPS}
     made: Form = {
         "surface_keys": {"properties": _properties(common)},
@@ -86,11 +89,6 @@ def _definitions(known: dict[tuple[str, str], Table]) -> Form:
         if kind:
             made[f"{place}.{kind}"] = _surface(kind, table) if place == "surface" else _object(table)
     return made
-
-
-def _only_default(key: TableKey) -> Any:
-    """The form of a key that may have no other value than that where it is left out."""
-    return {"const": key.default} if isinstance(key.default, float) else False
 
 
 def _one_of(known: dict[tuple[str, str], Table], place: str) -> Form:

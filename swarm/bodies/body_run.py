@@ -10,7 +10,7 @@ import numpy as np
 
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
-from ..contact.laws import Laws
+from ..contact.laws import NONE
 from ..errors import RunError
 from ..kernel.limits import SOLVED_PLACE
 from ..methods.base import Method
@@ -69,7 +69,8 @@ class BodyRun(BaseRun):
             len(self._ties.ends) + len(bodies.body.guides),
             len(compiled.numbering.surfaces_of_rows) + len(own),
         )
-        books = _books_of(self._walls[2] is not None, scene.moves(), self._touching.laws)
+        laws = self._touching.laws or NONE
+        books = _Books(self._walls[2] is not None, scene.moves(), laws.give_heat, laws.may_end)
         self._bodies = _state_of(bodies, particles, rows, walls, books)
         self._counted_by, self._counters = watched.counters, counters_of(scene, watched.counters, logs=True)
         self._bodies = self._with_counters(self._bodies, scene, bodies)
@@ -389,10 +390,6 @@ class _Books(NamedTuple):
     move: bool
     heat: bool
     absorb: bool
-
-
-def _books_of(opens: bool, moves: bool, laws: Laws | None) -> _Books:
-    return _Books(opens, moves, laws is not None and laws.give_heat, laws is not None and laws.may_end)
 
 
 def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int, books: _Books) -> BodyState:

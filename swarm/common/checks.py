@@ -321,7 +321,7 @@ def closest(value: Any, known: Iterable[str]) -> str:
 
 
 def known_keys(where: str, table: Iterable[str], known: Collection[str], hints: Mapping[str, str] = {}) -> None:
-    """Raise a `SceneError` for a key of a table that is none of these; `hints` are those of keys of other tables.
+    """Raise a `SceneError` for a key of a table that is not known; `hints` are those of keys of other tables.
 
     >>> known_keys("run.", {"untill": 1.0}, ("until", "every"))
     Traceback (most recent call last):

@@ -6,6 +6,7 @@ straight way through the wall the depth then first grows and at last falls, and 
 
 from ..kernel.jit import select
 from ..kernel.vector import dot
+from .laws import of_wall
 
 # The cosine of normals that are opposite, up to the bend of what lies between them: two sides of one wall. In the
 # edge of a solid, however sharp it is as a rule, a point turns from one side to another by less.
@@ -29,12 +30,4 @@ def passes(before, after, wall, way, turned, half_widths):
     depth = d0 + deeper * (d1 - d0 + back) / select(bent > 0.0, bent, 1.0)
     # A wall that turns the point by itself takes more of its way than its own shape does.
     by_shape = (deeper >= 0.0) & (back >= 0.0) & (bent > 0.5 * dot(turned, n0 + n1)) & (depth > 0.0)
-    return by_shape & ((dot(n0, n1) < _OPPOSITE) | (depth > _DEEP * _of(half_widths, wall)))
-
-
-def _of(numbers, wall):
-    """That of this wall."""
-    found = numbers[0]
-    for k, number in enumerate(numbers):
-        found = select(wall == k, number, found)
-    return found
+    return by_shape & ((dot(n0, n1) < _OPPOSITE) | (depth > _DEEP * of_wall(half_widths, wall)))

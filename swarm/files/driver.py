@@ -16,12 +16,7 @@ from . import paths
 NAME = "swarm"
 
 
-def _driver(plist: Any, **_options: Any) -> None:
-    plist.set_fapl_log(b"", 0, 0)
-
-
-h5py.register_driver(NAME, _driver)
-
+h5py.register_driver(NAME, lambda plist, **_options: plist.set_fapl_log(b"", 0, 0))
 
 # The files that this process has opened by it, and which they are. HDF5 is not asked: it crashes the process if it
 # could not close one, on a full disk.

@@ -291,9 +291,10 @@ def with_laws(table: Any, where: str) -> Any:
 
 def _law_of(table: Any, where: str) -> WallLaw | str:
     """A law of a wall from its table: of a kind, or of code that the caller allows."""
+    if isinstance(table, str) and "(" in table:
+        return table  # a trajectory has the text of an object of user-defined code
     if not isinstance(table, Mapping):
-        # A trajectory has the text of an object of user-defined code.
-        return table if isinstance(table, str) and "(" in table else _no_law(where, table)
+        raise SceneError(f'{where}: expected a table such as {{ kind = "lambert" }}, got {table!r:.200}')
     if "law" in table and "kind" in table:
         raise SceneError(f"{where}: expected a kind or a law, got both; remove one of them")
     key = "law" if "law" in table else "kind"
@@ -310,10 +311,6 @@ def _law_of(table: Any, where: str) -> WallLaw | str:
             raise SceneError(f"{where}.{name}: expected a number, got nothing; add {name} = ...")
     made: WallLaw = cls(**given)
     return made
-
-
-def _no_law(where: str, given: Any) -> Any:
-    raise SceneError(f'{where}: expected a table such as {{ kind = "lambert" }}, got {given!r:.200}')
 
 
 def table_of_law(law: Any) -> Any:

@@ -191,8 +191,11 @@ def require_in_plane(scene: Scene, source: Source, name: str) -> None:
 
 def require_beam(source: Source, name: str, position: Floats, normals: Floats) -> None:
     """Raise a `SceneError` for a beam that leads out of the vessel from a surface with these normals."""
-    if source.beam is not None and not (good := leads_in(source, normals)).all():
-        i = int(np.argmin(good))
+    if source.beam is None:
+        return
+    inwards = -(np.array(source.beam)[:, None] * normals).sum(axis=0)
+    if not (inwards > 0.0).all():
+        i = int(np.argmin(inwards > 0.0))
         raise SceneError(
             f"{name}.beam must lead from its surface to the admissible side, got {source.beam} at "
             f"{tuple(position[:, i].tolist())}, where the normal out of that side is "
@@ -341,8 +344,3 @@ def _into(source: Source, random: Random, normals: Floats, across: int | None) -
         # Each try has a stream with a row for every birth, so that no birth takes what is another's.
         velocity[:, wrong] = _beam(source, random.spawn(1)[0], n, across)[:, wrong]
     return velocity
-
-
-def leads_in(source: Source, normals: Floats) -> NDArray[np.bool_]:
-    """Whether the axis of a beam leads away from surfaces with these normals out of the vessel."""
-    return np.asarray((np.array(source.beam)[:, None] * normals).sum(axis=0) < 0.0)
