@@ -1,7 +1,7 @@
 """One impact of one particle on a wall: what becomes of the particle, and how that is booked.
 
-Every engine takes its impacts from here: the queues of points and of balls as a whole, and lanes in two loops, that of
-reflections and that of the laws by which a wall sends particles off, with a velocity of its temperature or by `laws`.
+Every engine takes its impacts from here. Queues of points and of balls take an impact as a whole. Lanes take it in two
+loops: one of reflections, and one of the laws by which a wall sends particles off (its temperature, or `laws`).
 """
 
 import math

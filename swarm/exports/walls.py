@@ -8,8 +8,8 @@ triangle of a mesh, the solid of a field, the part of a union, or the surface; N
 The solids of fields of more than 2000 are points of a file of their own: with "surface", "kind" (0 spheres, 1 boxes,
 2 cylinders, 3 capsules, 4 ellipsoids), "radius" [m] of what has one, "halves", half of the extent along their axes
 [m], and "orientation", a quaternion (w, x, y, z). ParaView draws spheres as Point Gaussian, or by Glyph of a Sphere of
-radius 1 that is scaled by "radius", others by Glyph of a Box, Cylinder or Sphere of half widths 1 that is scaled by
-"halves" and turned by "orientation", in mode Quaternion. A million take 120 MB.
+radius 1 that is scaled by "radius". It draws others by Glyph of a Box, Cylinder or Sphere of half widths 1 that is
+scaled by "halves" and turned by "orientation", in mode Quaternion. A million solids take 120 MB.
 """
 
 import bisect

@@ -21,8 +21,8 @@ def report(
     """A page of a run, or of a sweep: one file in HTML for any browser, which a notebook shows.
 
     Of a run it is that of `Trajectory.report`. Of a sweep it has the table of all runs, which a click on a column
-    sorts, graphs of the main observables over each parameter, mean and spread, the sweep file, how to reproduce it, and
-    links to the files of the runs.
+    sorts, with links to their files; graphs of the mean and the spread of the main observables over each parameter; and
+    the sweep file, and how to reproduce it.
 
     Args:
         path: a trajectory, or the folder of a sweep.

@@ -1,10 +1,10 @@
 """The keys of compiled kernels on disk, and their files.
 
-Numba finds it by the types of its arguments, pickled in an index with the classes of tuples: a class of a module by its
-name, so that no process can read the index which cannot import that module, and a class of a script or of a cell of a
-notebook by its value, which no other process takes for its own. Here a text stands for the types: the names of classes
-and the code of what is defined for them outside of this package. In a kernel itself classes are numbers, so that the
-process that loads it has its own in their place.
+Numba finds a kernel by the types of its arguments, which it pickles in an index with the classes of tuples. A class of
+a module is pickled by its name: a process that cannot import that module cannot read the index. A class of a script or
+of a cell of a notebook is pickled by its value, which no other process takes for its own. Here a text stands for the
+types: the names of classes, and the code of what is defined for them outside of this package. In a kernel itself
+classes are numbers, so that the process that loads it has its own in their place.
 """
 
 import io

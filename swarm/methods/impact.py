@@ -59,9 +59,10 @@ class Impact(base.Method):
     reflection; so is one along a face of a mesh, a side of an outline or a wall of a room that ends beyond that.
 
     A particle slides along one wall, or the edge of two, by the contact step of the scheme in Suzuki's composition of
-    fourth order, and leaves where the wall no longer presses on it, or meets another. Chattering (restitution e < 1)
-    ends after the sum of its geometric series. At rest, or inside the friction cone, it costs nothing. A corner of
-    three walls that move carries it in steps of their motion. An impulse of less than 1e-12 of the speed is no impact.
+    fourth order. It leaves a wall where that no longer presses on it, or where it meets another one. Chattering
+    (restitution e < 1) ends after the sum of its geometric series. At rest, or inside the friction cone, it costs
+    nothing. A corner of three walls that move carries it in steps of their motion. An impulse of less than 1e-12 of the
+    speed is no impact.
 
     Particles with a radius meet at instants too, and neither slide nor rest. Where a contact would last they bounce, so
     high that a flight from a wall back to it takes t_c (`contact_duration` of `Pairs`; without losses some 1e-7 of a

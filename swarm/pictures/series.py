@@ -80,10 +80,16 @@ ENERGIES = ("total", "kinetic", "rotational", "potential", "contact", "dissipate
 
 @dataclass(frozen=True)
 class Line:
-    """A time series: its entity, its name in the legend, and the observable that it shows.
+    """A time series of one number of an observable.
 
-    That is the number of one surface if it has one for each, of a row of numbers the sum, or what is `along` a vector,
-    its logarithm, or its growth since the frame before in a second, divided by `per`.
+    Attributes:
+        path: its entity.
+        name: in the legend.
+        observable: the name of the observable.
+        surface: the surface, of an observable with a number for each. Other rows of numbers are added up.
+        logarithm: whether the logarithm is shown.
+        per: of a rate, the growth in a second since the frame before: what it is divided by.
+        along: the direction in which a vector is shown.
     """
 
     path: str

@@ -170,8 +170,8 @@ def _eye(plane: str | None, low: Floats, high: Floats) -> Eye:
 def distance(eye: Eye, size: Floats) -> float:
     """The distance from the middle of a box from which all of its corners are seen.
 
-    A corner that is x to the right, y up and z nearer than the middle is seen from D where |x| and |y| are at most
-    (D - z) times the tangents of half the angles of view.
+    A corner lies x to the right of the middle, y above it, and z nearer. It is seen from the distance D if |x| and |y|
+    are at most (D - z) times the tangents of half the angles of view.
     """
     signs = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
     x, y, z = eye.seen(signs * size).T

@@ -157,10 +157,13 @@ class RunOptions(Validated):
 
 @dataclass(frozen=True)
 class Task:
-    """A run, checked; the particles are its own copy. Of bodies they are all points.
+    """A run, checked.
 
-    Of a shard of a run `start` is a digest of all particles of that run, `first` the number of the first particle, or
-    body, of the shard, and `scales` those of the whole run (`tally.scales_of`).
+    Attributes:
+        particles: a copy of its own; of bodies all their points.
+        first: of a shard, the number of its first particle or body.
+        start: of a shard, a digest of all particles of the run.
+        scales: of a shard, the scales of the whole run (`tally.scales_of`).
     """
 
     compiled: CompiledScene

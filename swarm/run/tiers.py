@@ -1,11 +1,11 @@
 """Two tiers of kernels with the same bits: plain Python, which starts at once, and compiled, where that pays.
 
-Plain Python takes 30 to 150 us an impact, the compiler 1 to 9 s for a new kind of scene: 20 particles with 6 impacts
-each in a sphere take 0.5 s of processor time from the start of Python to its end in plain Python, 2.7 s where their
-kernels are compiled, and 1.3 s where these are found, most of it to import the compiler. So a run of very few particles
-is in plain Python at first, without a look at what is compiled. (Rejected: to go on in plain Python while another
-process compiles. Of four drums that begin together all take twice as long, 44 s and 23 s of processor time, not 22 s
-and 12 s.)
+Plain Python takes 30 to 150 us an impact, the compiler 1 to 9 s for a new kind of scene. From the start of Python to
+its end, 20 particles with 6 impacts each in a sphere take 0.5 s of processor time in plain Python, and 2.7 s where
+their kernels are compiled. Where these are found in the cache they take 1.3 s, most of it to import the compiler. So a
+run of very few particles is in plain Python at first, without a look at what is compiled. (Rejected: to go on in plain
+Python while another process compiles. Of four drums that begin together all take twice as long, 44 s and 23 s of
+processor time, not 22 s and 12 s.)
 """
 
 import functools

@@ -1,9 +1,9 @@
 """Coulomb's friction in the impacts of balls that turn.
 
-With n the unit normal and g the slip, the velocity across n with which the surfaces pass at the point of contact, an
-impact has an impulse against g of mu times the normal one, at most what stops the slip. With q = I/(m R^2) = 2/5 that
-is m g/(1 + 1/q), 2/7 of m g, where m is the reduced mass of two balls, or the mass of a ball at a wall. It turns both
-balls the same way, so that linear and angular momentum are conserved.
+n is the unit normal, and g the slip: the velocity across n with which the surfaces pass each other at the point of
+contact. An impact has an impulse against g of mu times the normal impulse, and at most of what stops the slip. That is
+m g/(1 + 1/q) with q = I/(m R^2) = 2/5, so 2/7 of m g, where m is the reduced mass of two balls, or the mass of a ball
+at a wall. It turns both balls the same way, so that linear and angular momentum are conserved.
 
 Source: O. R. Walton, in M. C. Roco (ed.), Particulate Two-Phase Flow (1993), chapter 25, without restitution of the
 slip.

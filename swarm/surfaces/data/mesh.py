@@ -52,8 +52,9 @@ def from_mesh(
         common: rotation, restitution, and what else every surface takes.
 
     Returns:
-        The surface; its `mesh_error` is the largest distance [m] from it to the vertices, the middles of the edges and
-        of the triangles of the mesh, and its `mesh_weld` how far a corner was moved at most to close seams; None: none.
+        The surface. Its `mesh_error` is the largest distance [m] from it to the vertices, the middles of the edges and
+        the middles of the triangles of the mesh. Its `mesh_weld` is how far a corner was moved at most to close seams
+        [m], None where none was moved.
 
     Raises:
         SceneError: the file is missing or holds no mesh, the mesh is not closed or its parts intersect, an argument is

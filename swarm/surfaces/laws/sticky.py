@@ -10,9 +10,9 @@ class Sticky(WallLaw):
     Args:
         time: the mean residence time [s], 0 or more.
 
-    With another law it leaves by that: `laws=[Lambert(), Sticky(1e-3)]`. Files and observables have a particle that
-    waits where it is on the wall, with the velocity with which it will leave, so its energy and momentum are those
-    after the impact, and the log of impacts has the time of the impact. It costs nothing in frames in which it waits.
+    With another law it leaves by that: `laws=[Lambert(), Sticky(1e-3)]`. In files and observables a particle that waits
+    is at its place on the wall, with the velocity with which it will leave: its energy and momentum are those after the
+    impact. The log of impacts has the time of the impact. A particle costs nothing in frames in which it waits.
     With `Penalty` it leaves at the start of a step. A ball or a grain that waits is a fixed sphere for others. The
     scene must have no motion, and the wall no mass; where particles have a radius no wall has one.
 
