@@ -6,7 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import swarm
-from swarm.fleet import local, shards
+from swarm.files import paths
+from swarm.fleet import local
 
 from .report import Row, in_turn, show, tier, write
 
@@ -75,7 +76,7 @@ def of_many(run: Callable[[], float], client: object, path: Path, n: int) -> lis
     before = scheduler(time.process_time)
     seconds = run()
     busy = scheduler(time.process_time) - before
-    files = list(shards.folder_of(path).glob("*.h5"))
+    files = list(paths.shards_of(path).glob("*.h5"))
     size = sum(file.stat().st_size for file in files) / 3 / n
     return [
         Row(f"{len(files)} shards on two workers", seconds, seconds, "s"),
