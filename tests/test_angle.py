@@ -8,6 +8,7 @@ import pytest
 from conftest import compiled
 
 from swarm.kernel.angle import nearly_sine_and_versine, sine_and_cosine, sine_and_versine
+from swarm.surfaces.in_motion.drive import LITTLE_ANGLE, wave_of
 
 EPSILON = np.finfo(np.float64).eps
 RNG = np.random.default_rng(7)
@@ -53,6 +54,16 @@ def test_sines_and_cosines_of_arrays(angles):
     assert sines.tolist() == [sine_and_cosine(angle)[0] for angle in angles.tolist()]
     assert abs(sines - np.sin(angles)).max() <= 2.0 * EPSILON
     assert abs(cosines - np.cos(angles)).max() <= 2.0 * EPSILON
+
+
+def test_waves_of_a_little_later_have_the_digits_of_one():
+    with mpmath.workdps(40):
+        for angle in ANGLES["a few turns"][:300].tolist():
+            more = RNG.uniform(-LITTLE_ANGLE, LITTLE_ANGLE)
+            sine, versine = wave_of(angle).later(more)
+            both = mpmath.mpf(angle) + mpmath.mpf(more)
+            assert abs(sine - mpmath.sin(both)) <= 2.0 * EPSILON
+            assert abs(versine - 1 + mpmath.cos(both)) <= 4.0 * EPSILON
 
 
 def test_an_odd_and_an_even_function():

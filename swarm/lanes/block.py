@@ -19,7 +19,7 @@ from ..surfaces.time_of_impact import aim
 from .accounts import add_to_rows, add_work
 from .contact_ends import end_contacts, end_hard_contacts, impulses_before
 from .escape import meet_openings, step_out, step_out_lanes
-from .flight import go
+from .flight import aims, go
 from .hit_member import of_lane, pick, picks
 from .periodic import return_lanes, return_stepped, return_stepped_lanes
 from .sending import send_off
@@ -213,7 +213,9 @@ def _make_contacts(method, walls, gravity, share, lanes, picked, live):
     """The contact of every lane: (whether one has arrived, whether one is hard)."""
     some_arrived, some_hard, watches = False, False, share.watchers.of_impacts()
     at_once = method.lands and isinstance(walls, Aimed)
-    if at_once:
+    # The waves of a hit are those of its wall; a contact that looks around, or moves the hit, is asked of others too.
+    are_known = aims(walls, gravity) and walls.inset is None and not method.looks_around
+    if at_once and not are_known:
         for i in range(index(live)):
             aim.put_waves(walls, lanes.course, i, lanes.lane(i).remaining)
     for i in range(index(live)):

@@ -157,11 +157,16 @@ def _is_closed(gravity, walls):
     return gravity is None and not walls.in_steps()
 
 
+def aims(walls, gravity):
+    """Whether first hits with walls in any motion are guessed and proven."""
+    # A fall that walls often come near to is proven too seldom: in a box that shakes it took half as long again.
+    return gravity is None and isinstance(walls, Aimed)
+
+
 def _stride(walls, gravity, lanes, live):
     """Safe steps of all lanes to walls in any motion."""
-    # A fall that walls often come near to is proven too seldom: in a box that shakes it took half as long again.
-    course, aims = lanes.course, gravity is None and isinstance(walls, Aimed)
-    if aims:
+    course = lanes.course
+    if aims(walls, gravity):
         _stride_open(walls, gravity, lanes, _aim_at_moving(walls, gravity, lanes, live))
         return
     for i in range(index(live)):
@@ -230,8 +235,12 @@ def _stride_open(walls, gravity, lanes, some):
     for k in range(index(count)):
         one = Open(starts, k)
         strides.stride(walls, gravity, beside, k, one.r, one.v, one.remaining, True)
+    for k in range(index(count)):
+        aim.put_waves(walls, beside, k, Open(starts, k).remaining - beside[strides.TIME, k])
     for k in range(index(some)):
-        copy_lane(beside, k, course, index(lanes.order[k]), strides.FOUND)
+        i = index(lanes.order[k])
+        copy_lane(beside, k, course, i, strides.FOUND)
+        aim.copy_waves(walls, beside, k, course, i)
 
 
 def _go_by_steps(walls, gravity, lanes, live):

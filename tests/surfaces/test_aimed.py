@@ -8,11 +8,13 @@ import pytest
 
 import swarm
 from swarm.kernel.vector import dot, vec
+from swarm.lanes import block
 from swarm.lanes import flight as flights_of_lanes
 from swarm.surfaces.in_motion.drive import Swing, Swings
-from swarm.surfaces.in_motion.moving import Aimed
+from swarm.surfaces.in_motion.moving import Aimed, Moving
 from swarm.surfaces.time_of_impact import aim, strides
 from swarm.surfaces.time_of_impact.flights import COURSE
+from swarm.surfaces.walls import Following
 
 TURN = swarm.Rotation((1.0, 2.0, 3.0), rate=1.3, center=(0.1, 0.0, -0.05))
 MOTIONS = {
@@ -183,6 +185,41 @@ def test_lanes_without_a_proof_step_side_by_side_as_each_would_alone(monkeypatch
         alone = swarm.simulate(scene, one, swarm.Impact(), until=2.0, compile="never").particles
         assert alone.position[:, 0].tolist() == together.position[:, i].tolist()
         assert alone.velocity[:, 0].tolist() == together.velocity[:, i].tolist()
+
+
+# The box turns so fast that half of its lanes step; the sphere at rest is met in closed form.
+SCENES_AT_ONCE = {
+    "sphere": [swarm.Sphere(0.5, motion=MOTIONS["swing"])],
+    "box": [swarm.Box((0.5, 0.4, 0.3), motion=swarm.Rotation((1.0, 2.0, 3.0), rate=4.0, center=(0.1, 0.0, -0.05)))],
+    "a sphere at rest in it": [swarm.Box((0.5, 0.4, 0.3), motion=MOTIONS["sum"]), swarm.Sphere(0.1, side="outside")],
+}
+
+
+@pytest.mark.parametrize("name", SCENES_AT_ONCE)
+def test_contacts_have_the_waves_of_their_time(name, monkeypatch):
+    """Of hits that are proven, and of those to which lanes step, at all walls that move."""
+    scene, off, opened, make = swarm.Scene(SCENES_AT_ONCE[name]), [], [], block._make_contacts
+    marked = flights_of_lanes._mark_open
+
+    def counted(lanes, live):
+        opened.append(marked(lanes, live))
+        return opened[-1]
+
+    def compared(method, walls, gravity, share, lanes, picked, live):
+        for i in range(live):
+            number, remaining = int(lanes.wall[i]), lanes.lane(i).remaining
+            if number >= 0 and isinstance(walls.each[number], (Moving, Following)):
+                drives = aim.with_waves(walls, lanes.course, i).drives()
+                off.extend(np.abs(np.subtract(drive.waves, drive.waves_at(remaining))).max() for drive in drives)
+        return make(method, walls, gravity, share, lanes, picked, live)
+
+    monkeypatch.setattr(flights_of_lanes, "_mark_open", counted)
+    monkeypatch.setattr(block, "_make_contacts", compared)
+    swarm.simulate(scene, swarm.fill(scene, 12, speed=1.0, seed=1), swarm.Impact(), until=2.0, compile="never")
+    assert len(off) >= 12
+    assert sum(opened) > 0
+    # Of the rounding of the time, too
+    assert max(off) <= 4.0 * np.finfo(float).eps * (1.0 + 4.0 * 2.0)
 
 
 def _sphere_in_digits(turn, center, radius, r, v, at):

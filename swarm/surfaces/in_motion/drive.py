@@ -13,12 +13,15 @@ from ... import motion as motions
 from ...kernel.angle import nearly_sine_and_versine, sine_and_versine
 from ...kernel.arrays import index
 from ...kernel.jit import Array, select
+from ...kernel.limits import EPSILON
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Vec, cross, dot, square, vec
 from ..surface import Surface
 
 # A motion changes little in this part of a radian, or of a piece of a path.
 _SLOW = 0.05
+# Of an angle up to this one a^4/24 is round-off.
+LITTLE_ANGLE = (24.0 * EPSILON) ** 0.25
 
 
 class RotationRows(Record):
@@ -68,6 +71,14 @@ class Wave(Record):
 
     sine: float
     versine: float
+
+    def later(self, angle):
+        """The wave of an angle that is larger by so little, `LITTLE_ANGLE` at most, without another sine."""
+        cosine, versine = 1.0 - self.versine, 0.5 * (angle * angle)
+        sine = angle - angle * versine * (1.0 / 3.0)
+        return Wave(
+            self.sine + (cosine * sine - self.sine * versine), self.versine + (self.sine * sine + cosine * versine)
+        )
 
 
 def wave_of(angle):

@@ -14,7 +14,7 @@ from typing import Any
 from ...kernel.jit import select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import norm
-from ..in_motion.drive import Wave
+from ..in_motion.drive import LITTLE_ANGLE, Wave
 from ..in_motion.moving import Moving
 from .rising import ThirdDerivativeBound, flight_of, nearest_root
 from .safe import closed_hit, seen_by_walls
@@ -77,13 +77,28 @@ def put_waves(walls, course, lane, left, nearly=False):
 
 def with_waves(walls, course, lane):
     """The walls with the waves that were put for a lane."""
-    at = _first_wave(walls)
-    waves: tuple[Wave, ...] = ()
+    return walls.with_waves(tuple(Wave(course[at, lane], course[at + 1, lane]) for at, _rate in _waves(walls)))
+
+
+def copy_waves(walls, source, i, target, k):
+    """The waves of lane i of a course into lane k of another."""
+    for at, _rate in _waves(walls):
+        target[at, k], target[at + 1, k] = source[at, i], source[at + 1, i]
+
+
+def _carry_waves(walls, course, lane, way, proven):
+    """The waves at the guess of a lane so much later, or sooner, if its hit is proven there."""
+    for at, rate in _waves(walls):
+        before = Wave(course[at, lane], course[at + 1, lane])
+        course[at, lane], course[at + 1, lane] = select(proven, before.later(rate * way), before)
+
+
+def _waves(walls):
+    """(the first row of a wave, its rate) of each that is kept."""
+    rates: tuple[float, ...] = ()
     for drive in _known_drives(walls):
-        for _rate in drive.rates():
-            waves = (*waves, Wave(course[at, lane], course[at + 1, lane]))
-            at += _OF_WAVE
-    return walls.with_waves(waves)
+        rates = (*rates, *drive.rates())
+    return tuple((_first_wave(walls) + k * _OF_WAVE, rate) for k, rate in enumerate(rates))
 
 
 def _first_wave(walls):
@@ -140,8 +155,11 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
             start = type(level)(*(course[at + i, lane] for i in range(3)), *level[3:])
             proven = proven & near & start.is_below(1.0, sixth, ahead, True)
             proven = proven & end.is_below(-1.0, sixth, time - since, mine)
+    for _at, rate in _waves(walls):
+        proven = proven & ((not meets) | (abs(rate) * far <= LITTLE_ANGLE))
     course[TIME, lane] = select(proven, time, 0.0)
     course[MET, lane] = select(proven & meets, wall, -1.0)
+    _carry_waves(walls, course, lane, way, proven & meets)
 
 
 def has_series(walls):
