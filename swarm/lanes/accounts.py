@@ -56,7 +56,11 @@ def add_work(walls, impulse, i, wall, given):
 
 
 def add_to_rows(walls, rows, row, i, wall, given):
-    """rows[row + the row of a wall, i] += given, without a branch; of any other wall nothing."""
+    """rows[row + the row of a wall, i] += given, without a branch; of no wall 0 is given."""
+    if len(walls.each) == 1 and not walls.fields():
+        # A loop over rows here would not vectorise.
+        rows[row, i] += given
+        return
     for one in walls.each:
         if isinstance(one, Field):
             count = one.count()

@@ -224,13 +224,14 @@ def _make_contacts(method, walls, gravity, share, lanes, picked, live):
         here = method.walls_of(aim.with_waves(here, lanes.course, i) if at_once else here, lane.remaining)
         contact = method.contact(here, gravity, lane, lanes.wall[i], found)
         arrived, hard = _put_contact(method, lanes, i, contact), (contact.wall <= methods.HARD) & (not method.holds)
-        _add_impulse(walls, lanes.impulse, i, contact.wall, contact.impulse)
+        add_to_rows(walls, lanes.impulse, 0, i, contact.wall, contact.impulse)
         add_work(walls, lanes.impulse, i, contact.wall, contact.work)
         lanes.wall[i] = contact.wall
         for watch in watches:
             watch.note(lanes, i, contact.impulse)
         end_contacts(method, walls, gravity, share, lanes, i, lane.v, (contact.wall, contact.impulse))
-        some_arrived, some_hard = some_arrived | arrived | lanes.marked[i], some_hard | hard
+        arrived = arrived if method.laws_at_ends is None else arrived | lanes.marked[i]
+        some_arrived, some_hard = some_arrived | arrived, some_hard | hard
     return some_arrived, some_hard
 
 
@@ -243,12 +244,3 @@ def _put_contact(method, lanes, i, contact):
         lane.twice = contact.twice_energy
     lanes.marked[i] = contact.lasts | (not (contact.remaining > 0.0))
     return contact.lasts | (not (contact.remaining > 0.0))
-
-
-def _add_impulse(walls, impulse, i, wall, given):
-    """impulse[wall, i] += given, without a branch; a loop over rows here would not vectorise."""
-    if len(walls.each) == 1 and not walls.fields():
-        # With one wall the impulse is that of this wall, or 0.
-        impulse[0, i] += given
-    else:
-        add_to_rows(walls, impulse, 0, i, wall, given)

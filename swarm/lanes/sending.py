@@ -60,8 +60,7 @@ def _compute(method, walls, gravity, share, lanes, picked, i):
     # The contact is done, unless a wall at 0 K holds the particle, or one of its own law may.
     holds = not square(found.v) > 0.0
     if laws.own is not None:
-        after = lanes.given(method, i)._replace(v=found.v)
-        holds = holds | method.is_within(after, found.twice_away, 1.0)
+        holds = holds | method.is_within(lanes.given(method, i), square(found.v), found.twice_away, 1.0)
     sent.v, sent.twice, sent.impulse, sent.work = found.v, found.twice_energy, found.impulse, found.work
     sent.lost, sent.heat, sent.wait = found.lost, found.heat, found.wait
     sent.wall = select(holds, wall, -1.0)

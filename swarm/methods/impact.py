@@ -213,30 +213,39 @@ class Reflection(contract.MethodNumbers):
 
     def contact(self, walls, gravity, lane, wall, solution):
         bounce = exact(self.laws, walls, gravity, wall, lane.r, lane.v, lane.own.energy)
-        hit = wall >= 0.0
-        impulse = select(hit, bounce.impulse, 0.0)
+        hit, speed2 = wall >= 0.0, self.speed2_of(gravity, lane)
+        impulse, away = select(hit, (bounce.impulse, bounce.twice_away), (0.0, 0.0))
         return contract.Contact(
             lane.r,
             select(hit, bounce.v, kept(lane.v)),
             lane.remaining,
             wall,
             impulse,
-            select(self.is_within(lane, impulse, _NO_IMPACT), 0.0, 1.0),
+            select(self.is_within(lane, speed2, impulse, _NO_IMPACT), 0.0, 1.0),
             select(hit, bounce.twice_energy, lane.own.energy.twice),
-            hit & self.is_within(lane, bounce.twice_away, 1.0),
+            hit & self.is_within(lane, speed2, away, 1.0),
             select(hit, 0.5 * bounce.work, 0.0),
         )
 
-    def is_within(self, lane, speed, part):
+    def speed2_of(self, gravity, lane):
+        """|v|^2 with which a lane comes."""
+        if gravity is not None:
+            return square(lane.v)
+        # As the energy says it, which round-off may leave below 0.
+        speed2 = lane.own.energy.twice
+        return select(speed2 > 0.0, speed2, 0.0)
+
+    def is_within(self, lane, speed2, speed, part):
         """Whether a speed is at most this part of twice the speed away from a wall below which a contact may last.
 
         A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it; `slow` is twice that speed.
         """
         if not self.laws.change_energy:
             return speed <= part * lane.own.slow
-        # By the velocity with which it comes: such walls change that. One of both is 0.
-        speed2, by_time, by_length = square(lane.v) + self.fall2, self.shortest_flight, self.shortest_length
-        slow2 = speed2 * ((by_time * by_time * speed2 + by_length * by_length) * (1.0 / (self.size * self.size)))
+        # By the |v|^2 with which it comes: such walls change that. One of both is 0.
+        speed2, by_time, by_length = speed2 + self.fall2, self.shortest_flight, self.shortest_length
+        part_of_size = 1.0 / (self.size * self.size)
+        slow2 = speed2 * (by_time * by_time * part_of_size * speed2 + by_length * by_length * part_of_size)
         return speed * speed <= (part * part) * slow2
 
 
