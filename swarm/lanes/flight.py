@@ -184,7 +184,8 @@ def _stride(walls, gravity, lanes, live):
 def _aim_at_moving(walls, gravity, lanes, live):
     """The proven hits of all lanes with walls in any motion; the number of those without, which are in `lanes.order`.
 
-    Those go on by one safe step, and aim again in the next pass.
+    Those go on by one safe step, and aim again in the next pass. (Measured in spheres that swing or turn: a guess and
+    its sine in one loop 1.1 to 1.2 of the time, a parabola and its root in a loop each 1.0 to 1.07.)
     """
     course = lanes.course
     for i in range(index(live)):
@@ -235,6 +236,7 @@ def _stride_open(walls, gravity, lanes, some):
     for k in range(index(count)):
         one = Open(starts, k)
         strides.stride(walls, gravity, beside, k, one.r, one.v, one.remaining, True)
+    # A contact takes them from its course, where a proof has left those of its hit.
     for k in range(index(count)):
         aim.put_waves(walls, beside, k, Open(starts, k).remaining - beside[strides.TIME, k])
     for k in range(index(some)):
