@@ -13,6 +13,7 @@ from swarm import scene_file
 from swarm.kernel.gravity import Bounds
 from swarm.kernel.grid import cell_of, entries_of, until_out
 from swarm.kernel.vector import Vec, vec
+from swarm.run.engine import Run
 from swarm.serialization import tables
 from swarm.surfaces.depth import penetration
 from swarm.surfaces.facets import free_room as room
@@ -264,6 +265,44 @@ def test_what_touches_one_side_of_a_ledge_is_not_deep_behind_the_other():
     assert penetration(behind, Vec(0.5, 0.5, -2e-9)) == pytest.approx(2e-9)
 
 
+def thick():
+    return hollow(0.2)
+
+
+@pytest.mark.parametrize(
+    ("made", "side", "share"),
+    [(thorny, "inside", 0.97), (thorny, "outside", 0.7), (thick, "inside", 1.0), (thick, "outside", 1.0)],
+)
+def test_what_is_lost_behind_a_facet_is_as_deep_as_it_is_far_from_the_mesh(made, side, share):
+    """Beyond its grid, and in it: all but what is as near to a facet that it is before."""
+    mesh = swarm.Mesh(*made(), side)
+    points = np.random.default_rng(5).uniform(-1.5, 1.5, (3, 1000))
+    outside = (1.0 if side == "inside" else -1.0) * mesh.phi(points)
+    walls = swarm.Scene([mesh]).compiled().walls()
+    deep = np.array([penetration(walls, Vec(*point)) for point in points.T.tolist()])
+    seen = deep > 0.0
+    assert np.abs(deep - outside)[seen].max() < 1e-14
+    assert seen.sum() >= share * (outside > 0.0).sum() > 15
+    # Where the walls are not there nothing is lost.
+    absent = walls._replace(each=(walls.each[0]._replace(members=walls.each[0].members.gone()),))
+    assert all(penetration(absent, Vec(*point)) == 0.0 for point in points.T[:100].tolist())
+
+
+def test_a_run_that_loses_a_particle_behind_a_facet_ends_with_a_sentence(monkeypatch):
+    advance = Run.advance
+
+    def lose(run, *given, **options):
+        done = advance(run, *given, **options)
+        run.state.position[:, 1] = (0.0, 0.0, 1.75)
+        run.observe()
+        return done
+
+    monkeypatch.setattr(Run, "advance", lose)
+    start = swarm.Particles(np.zeros((3, 3)), np.eye(3))
+    with pytest.raises(swarm.RunError, match=r"particle 1: it is 0\.25 m outside surfaces\[0\] \(Mesh\)"):
+        swarm.simulate(swarm.Scene([box_of_triangles()]), start, swarm.Impact(), until=1.0, compile="never")
+
+
 @pytest.mark.parametrize("motion", [None, swarm.Rotation((1.0, 2.0, 3.0), 0.5, (0.3, 0.0, 0.0))])
 @pytest.mark.parametrize("gravity", [None, (0.1, -0.2, -0.4)])
 def test_a_flight_past_a_saddle_vertex_goes_on(motion, gravity):
@@ -423,7 +462,7 @@ def test_memory_of_a_triangle():
         members.table,
         *(one for one in members.grid if isinstance(one, np.ndarray)),
         *members.grid.known,
-        *mesh._tree,
+        *mesh._tree[:2],
     ]
     assert sum(one.nbytes for one in (*arrays, mesh.group)) < 400 * len(mesh)
 

@@ -61,6 +61,7 @@ class FacetCells(Record):
 
     planes: Array  # (blocks, 8, BLOCK) int16, of each the normal, the half and the ball: `passes`
     room: Array  # (cells + 1, 8) int8, of each what is free around it: see free_room.py
+    boxes: Any = None  # of a closed mesh, `boxes_of` its triangles
 
     def spare(self, cell):
         """How many of the last entries of a cell are there again, to fill its last block."""

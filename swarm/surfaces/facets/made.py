@@ -135,4 +135,6 @@ def with_room(facets: Facets, mesh: Any, is_solid: bool) -> Facets:
         rows[:-1, KIND] = np.where(held, rows[:-1, KIND].reshape(shape), sides[parts]).ravel()
         with_blocks(rows, held)
     rows[-1, KIND] = FREE if is_solid else CLOSED
-    return facets
+    if mesh is None:
+        return facets
+    return facets._replace(grid=grid._replace(known=grid.known._replace(boxes=mesh[2])))

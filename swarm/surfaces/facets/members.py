@@ -5,7 +5,7 @@ import math
 from ...kernel.arrays import fetch, index
 from ...kernel.gravity import accelerated, displacement
 from ...kernel.grid import cell_of, entries_at, entries_of, until_next, until_out
-from ...kernel.jit import outlined
+from ...kernel.jit import outlined, select
 from ...kernel.vector import cross, dot, square
 from ..fields.members import Members, member
 from ..presence.patched import Patched
@@ -13,14 +13,14 @@ from ..shapes.plane import PlaneNumbers
 from ..time_of_impact import flights
 from .facet import ROOM, Shared
 from .facet_cells import BLOCK, blocks_of, flight_in, from_middle, passes
-from .free_room import FULL, KIND, room_of, without_entries
+from .free_room import FREE, FULL, KIND, room_of, without_entries
 from .nearest import foot_on
 
 # So many cells and blocks of cells are crossed before a flight is said to be free so far.
 _MOST = 4000
 # Facets are on one plane up to this sine of the angle between them. A place is on a plane up to this distance from it,
-# in units of round-off.
-_PARALLEL, _ON = 1e-9, 1.0
+# in units of round-off. Of two facets one is nearer where their distances differ by this part.
+_PARALLEL, _ON, _NEARER = 1e-9, 1.0, 1e-9
 
 
 class Facets(Members, Patched):
@@ -48,6 +48,11 @@ class Facets(Members, Patched):
 
     def field_hit(self, gravity, r, v):
         return _first_hit(self, gravity, r, v)
+
+    def tree(self):
+        """What `foot_on` finds the nearest triangle of a closed mesh by."""
+        shared = self.like.corners
+        return shared.vertices, shared.triangles, self.grid.known.boxes
 
     def foot(self, tree, r):
         return foot_on(self, tree, r)
@@ -111,19 +116,32 @@ def _is_behind_another(facets, number, r):
 def _deepest(facets, r):
     """The largest distance behind any facet; where one that a point is before or behind is nearer, how far behind it.
 
-    At a sharp ridge what is before one of its facets is behind the other.
+    At a sharp ridge what is before one of its facets is behind the other. Of a point that is lost behind a closed mesh
+    it is the distance from that.
     """
-    first, stop = entries_at(facets.grid, r)
-    most, near, depth_there = -math.inf, math.inf, 0.0
+    cell = cell_of(facets.grid, r)
+    first, stop = entries_of(facets.grid, cell.number)
+    most, near, depth_there, ahead, behind = -math.inf, math.inf, 0.0, math.inf, math.inf
     for k in range(first, stop):
-        most = max(most, member(facets, index(facets.grid.entries[k])).distance(r))
+        facet = member(facets, index(facets.grid.entries[k]))
+        distance, is_behind = facet.distance(r), facet.phi(r) > facet.behind()
+        most = max(most, distance)
+        behind = select(is_behind & (-distance < behind), -distance, behind)
+        ahead = select(is_behind | (-distance >= ahead), ahead, -distance)
     # Before all of them, as most points are
     for k in range(first, stop if most > 0.0 else first):
         facet = member(facets, index(facets.grid.entries[k]))
         depth = facet.phi(r)
         if abs(depth) < near and not facet.is_beyond(r, -(facet.room.value + facet.corners.beyond)):
             near, depth_there = abs(depth), depth
-    return most if most <= near else depth_there
+    deepest = most if most <= near else depth_there
+    if facets.grid.known.boxes is not None:
+        # All facets are looked at only for a point that may be lost: not where one it is before is as near as another.
+        is_lost = first == stop or behind < (1.0 - _NEARER) * ahead
+        is_lost = is_lost and facets.grid.known.room[index(cell.number), KIND] != FREE
+        if is_lost and not facets.is_gone():
+            deepest = max(deepest, foot_on(facets, facets.tree(), r).gap)
+    return deepest
 
 
 @outlined
