@@ -88,7 +88,7 @@ class CollidingRun(BaseRun):
             self._flock = self._flock._replace(followed=np.zeros(n))
         self._books = CollisionTotals(
             state.impulse, state.dissipated, state.impacts, balls.virial, state.image, state.heat, state.mass,
-            state.crossed,
+            state.crossed, None if self._windows is None else state.impacts.copy(),
         )  # fmt: skip
         self._ball_numbers = BallNumbers(scene, particles)
         self._rest_was_reported = False
@@ -110,6 +110,8 @@ class CollidingRun(BaseRun):
 
     def _prepare(self, span: float, moment: float) -> None:
         self._frame_before = moment - span
+        if self._books.before is not None and not self._cut_short:
+            np.copyto(self._books.before, self.state.impacts)
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
         page = self._open_page(moment)
@@ -273,6 +275,7 @@ class CollidingRun(BaseRun):
             "spin": self._balls.spin, "absorbed_time": state.absorbed_time, "absorbed_wall": state.absorbed_wall,
             "window": None if self._windows is None else self._windows.numbers,
             "held": None if flock.holds is None else self._box.kinds.mass, "crossed": state.crossed,
+            "impacts_before": self._books.before,
         }  # fmt: skip
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:

@@ -26,6 +26,7 @@ from .starting_state import Seeding
 
 # Of a particle that does not go on, where no user-defined function may be the cause.
 _REPORT = "; if nothing is special about the place, it is an error of swarm: please report it with the scene"
+_CLOSED = ": walls that move have closed on it; end the run before"
 # Of the size: a ball this near to a wall touches it.
 _TOUCHES = 1e-9
 # What Numba says of the line that it could not compile, and of why.
@@ -47,7 +48,7 @@ def of_frame(
     if status in (Status.STALLED, Status.TIMELESS):
         sentence += _place(scene, state, particle, moment) + _cause(scene, status)
     if status == Status.STALLED and scene.moves():
-        sentence += ": walls that move have closed on it; end the run before"
+        sentence += _CLOSED
     if status == Status.TOO_FAST:
         sentence += f", {method.too_fast(scene)}"
     if status == Status.TOO_DEEP:
@@ -70,6 +71,8 @@ def after(
     A ball has a radius [m].
     """
     gap = "" if radius is None or status != Status.TIMELESS else _in_gap(scene, place, moment, radius)
+    if status == Status.STALLED and scene.moves():
+        gap = _CLOSED
     return (
         f"the frame after {before:g} s failed at particle {particle}: {status.sentence}; it is at "
         f"{shown(place, 6)} m at {moment:.9g} s{gap or _cause(scene, status)}"

@@ -45,6 +45,7 @@ class CollisionTotals(NamedTuple):
     heat: Any = None  # (walls, 1) that walls gave [J], or None
     mass: Any = None  # (N,) of balls
     crossed: Any = None  # `Crossed`, where there are counters
+    before: Any = None  # (N,) `impacts` when the frame began, where walls move
 
 
 class CollisionRule(NamedTuple):

@@ -15,6 +15,7 @@ from ...kernel.gravity import potential
 from ...kernel.jit import long_kernel, outlined, select
 from ...kernel.vector import either, norm, put, square
 from ...lanes.watching.log import Struck, is_full
+from ..reacting.queue import MOST_HITS
 from .again import aim_again, queue_both, stay, vanish
 from .bounce import FLIES, GONE, STAYS, bounce, press
 from .cells import cross, mark_near, until_exit
@@ -131,6 +132,9 @@ def _at_given_wall(box, flock, books, clock, i, now):
         elif ended == FLIES:
             aim_again(box, flock, i, now)
             queue_both(flock, i)
+            # Walls that close on a ball hit it without end, each time sooner.
+            if books.before is not None and books.impacts[index(i)] - books.before[index(i)] > MOST_HITS:
+                ended = Status.STALLED.value
     else:
         _look_for_wall(box, flock, i, now)
     return ended
