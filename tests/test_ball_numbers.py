@@ -60,6 +60,21 @@ def test_balls_that_have_left_or_wait_have_no_pressure(law, method):
     assert seen["pressure"][2] == 0.0
 
 
+@pytest.mark.parametrize("method", [swarm.Impact(), swarm.Penalty(0.01, 1e3, 1.5)])
+def test_balls_beyond_an_open_face_have_no_pressure(method):
+    """Of two, one leaves, which then counts as escaped; the other goes on from wall to wall."""
+    balls = swarm.Particles([[0.0, 0.0], [0.0, 0.5], [0.0, -0.5]], [[0.0, 1.0], [0.0, 0.0], [1.0, 0.0]], radius=0.1)
+    balls.volume = 8.0
+    scene = swarm.Scene([swarm.Box((1.0, 1.0, 1.0), open=["+z"])])
+    seen = swarm.simulate(scene, balls, method, until=6.0, every=1.0, compile="never").observables
+    assert seen["escaped"].tolist() == [0, 0, 1, 1, 1, 1, 1]
+    alone = swarm.Particles(balls.position[:, 1:], balls.velocity[:, 1:], radius=0.1)
+    alone.volume = 8.0
+    other = swarm.simulate(scene, alone, method, until=6.0, every=1.0, compile="never").observables
+    assert seen["pressure"][3:].tolist() == pytest.approx(other["pressure"][3:].tolist(), rel=1e-12)
+    assert seen["pressure"][1] > 1.5 * other["pressure"][1]
+
+
 def test_a_run_that_goes_on_has_the_same():
     numbers, balls = of(2)
     numbers.frame(state_of(balls), 0.0, 1.0)

@@ -278,7 +278,8 @@ class BaseRun:
         self._tier.kernel(observables.observe)(*self._observing())
         # Rates are those of a frame, not of a piece of one.
         if self._ball_numbers is not None and moment == self._end:
-            kinetic = self._summed()["kinetic_energy"] - self._kinetic_of(self.state.gone() | self._waiting())
+            idle = self.state.gone() | self._waiting() | self._has_left()
+            kinetic = self._summed()["kinetic_energy"] - self._kinetic_of(idle)
             self._ball_numbers.frame(self._seen_state(), moment, kinetic)
 
     def _observing(self, drawn: NDArray[Any] | None = None) -> tuple[Any, ...]:
@@ -317,9 +318,18 @@ class BaseRun:
         return seen
 
     def _escaped(self) -> int:
-        """The number of particles that are far away and have left through no opening."""
-        far = np.sqrt((self.state.position**2).sum(axis=0)) > self._far
-        return int((far & ~self.state.gone()).sum())
+        """The number of particles that have left an open scene through no opening."""
+        return int((self._has_left() & ~self.state.gone()).sum())
+
+    def _has_left(self) -> NDArray[np.bool_]:
+        """(N,) whether each is far away, or beyond an open face and flies in its direction, as points are counted."""
+        state = self.state
+        if self._far == math.inf:
+            return np.zeros(state.mass.size, np.bool_)
+        left: NDArray[np.bool_] = np.sqrt((state.position**2).sum(axis=0)) > self._far
+        for *n, offset in self._scene.open_faces(self._moment):
+            left |= (n @ state.position > offset) & (n @ state.velocity > 0.0)
+        return left
 
     def _seen_state(self) -> State:
         """The state of the particles that are there at the last frame."""
