@@ -24,7 +24,8 @@ _NORMAL = Vec(0.0, 0.0, 1.0)
 class Arriving(Record):
     """A particle at a wall: where, its velocity, twice its energy per mass, and its mass [kg].
 
-    Laws do not act on what comes slower along the normal than `slow`.
+    Laws do not act on what comes slower along the normal than `slow`. A ball with its centre at `r` is in contact with
+    the wall at `touch`; None: at `r`.
     """
 
     r: Vec
@@ -32,6 +33,11 @@ class Arriving(Record):
     twice: float
     mass: float
     slow: float = 0.0
+    touch: Any = None
+
+    def contact(self):
+        """The point of contact with the wall."""
+        return self.r if self.touch is None else self.touch
 
 
 class RandomSource(Record):
@@ -50,7 +56,7 @@ def impact_on_wall(laws, walls, gravity, wall, arriving, random):
 
     `random` are the random numbers of the impact, which are used by such laws alone.
     """
-    bounce = exact(laws, walls, gravity, wall, arriving.r, arriving.v, energy_of(arriving.twice))
+    bounce = exact(laws, walls, gravity, wall, arriving.r, arriving.v, energy_of(arriving.twice), arriving.contact())
     if laws.send_off:
         happens, sent = by_law(laws, walls, gravity, wall, arriving, random)
         bounce = select(happens, sent, bounce)
@@ -62,7 +68,7 @@ def by_law(laws, walls, gravity, wall, arriving, random):
     r, v, mass, twice = arriving.r, arriving.v, arriving.mass, arriving.twice
     n, moving, fall = (
         walls.unit_normal(wall, r),
-        wall_velocity(laws.moving, walls, wall, r),
+        wall_velocity(laws.moving, walls, wall, arriving.contact()),
         2.0 * potential(gravity, r),
     )
     before = relative(moving, v)

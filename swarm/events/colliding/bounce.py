@@ -114,7 +114,11 @@ def _turned(box, flock, books, walls, wall, ball):
         laws = laws._replace(friction=None)
     if laws.send_off:
         random = box.source.of_impact(i, books.impacts[index(i)], laws)
-    arriving = Arriving(r, v, flock.kept(i, square(v) + fall), box.kinds.mass_of(i))
+    touch = None
+    # Along the normal a wall that turns is as fast at the centre of the ball.
+    if laws.moving is not None and (laws.friction is not None or laws.send_off):
+        touch = r + box.kinds.radius_of(i) * walls.unit_normal(wall, r)
+    arriving = Arriving(r, v, flock.kept(i, square(v) + fall), box.kinds.mass_of(i), touch=touch)
     turned = impact_on_wall(laws, walls, box.pull, wall, arriving, random)
     if box.loss is not None and laws.restitution is not None and box.loss.spares(flock, i, now):
         turned = impact_on_wall(laws._replace(restitution=None), walls, box.pull, wall, arriving, random)
@@ -127,7 +131,7 @@ def _turned(box, flock, books, walls, wall, ball):
         if box.turning is not None:
             return rub_wall(box.laws, walls, wall, box.turning, (i, box.kinds.radius_of(i), r), lifted)
         if lifted.impulse > turned.impulse:
-            return _rubbed(box.laws, walls, wall, r, lifted, lifted.impulse - turned.impulse)
+            return _rubbed(box.laws, walls, wall, arriving, lifted, lifted.impulse - turned.impulse)
     return lifted
 
 
@@ -161,9 +165,9 @@ def _lifted(box, walls, wall, r, turned):
     return turned
 
 
-def _rubbed(laws, walls, wall, r, bounce, impulse):
+def _rubbed(laws, walls, wall, arriving, bounce, impulse):
     """The `Bounce` of a ball that does not turn, with the friction of a further normal impulse."""
-    n, u = walls.unit_normal(wall, r), wall_velocity(laws.moving, walls, wall, r)
+    n, u = walls.unit_normal(wall, arriving.r), wall_velocity(laws.moving, walls, wall, arriving.contact())
     w = relative(u, bounce.v)
     rubbed, taken = rub(laws, wall, n, w, impulse)
     work = given(u, rubbed - w)
