@@ -42,8 +42,9 @@ from .vessel import met, moves
 
 
 def across(a, n):
-    """What of a vector is across another one."""
-    return a - (dot(a, n) / square(n)) * n
+    """What of a vector is across another one; all of it where that is 0."""
+    size2 = square(n)
+    return a - (dot(a, n) / select(size2 > 0.0, size2, 1.0)) * n
 
 
 def rubbed(drag, slip, ease, limit):
@@ -72,8 +73,12 @@ def _carried(wall, r0, r1):
 
 
 def _facing(own, way, radius, r0, move):
-    """The unit normal of a contact with a wall, and `_carried` of the wall at the contact."""
-    n = way.along * (1.0 / math.sqrt(square(way.along)))
+    """The unit normal of a contact with a wall, and `_carried` of the wall at the contact.
+
+    The normal is 0 where a step goes from one side of a slab to the other as far: what its ends store is the same.
+    """
+    size2 = square(way.along)
+    n = way.along * (1.0 / math.sqrt(select(size2 > 0.0, size2, 1.0)))
     return n, _carried(own, r0 - radius * n, r0 + move - radius * n)
 
 

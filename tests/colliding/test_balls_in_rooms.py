@@ -267,3 +267,14 @@ def test_rooms_that_touch_at_a_face_are_as_one_box():
         )
         ends.append(done.particles.position)
     np.testing.assert_allclose(*ends, atol=1e-13)
+
+
+def test_the_bend_of_an_edge_is_that_of_its_circle_and_none_where_walls_touch():
+    def edge(radius, x):
+        one, other = (
+            wall for sphere in (swarm.Sphere(0.5), swarm.Sphere(radius, (x, 0.0, 0.0))) for wall in sphere.walls()
+        )
+        return joined_faces.RoomEdge(one, other, (0.0, 1.0))
+
+    assert edge(0.4, 0.3).bend_at(Vec(0.3, 0.4, 0.0)) == pytest.approx(0.4, rel=1e-14)
+    assert edge(0.25, 0.25).bend_at(Vec(0.5, 0.0, 0.0)) == math.inf

@@ -50,3 +50,12 @@ def test_balls_that_settle_at_the_tip_of_a_cone_run():
     seen = ran(scene, start, swarm.Penalty(1e-3, 2e4, 1.5), 0.4, every=0.1).observables
     assert seen["energy_error"].max() < 1e-12
     assert seen["kinetic_energy"][-1] < 0.3 * seen["kinetic_energy"].max()
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_a_step_across_a_slab_that_ends_as_far_beyond_it_is_too_deep(friction):
+    """What is stored is the same at both ends, so that the step has no normal: friction divided by its length."""
+    slab = swarm.Slab((1.0, 0.0, 0.0), 0.5, friction=friction)
+    ball = swarm.Particles((0.31, 0.0, 0.0), (-62.0, 5.0, 0.0), radius=0.2)
+    with pytest.raises(swarm.RunError, match=r"it overlaps surfaces\[0\] \(Slab\) by 0\.63 m, more than its radius"):
+        ran(swarm.Scene([slab]), ball, swarm.Penalty(0.01, 1.0, 1.0), 0.05)
