@@ -139,12 +139,17 @@ def test_a_wall_that_comes_where_a_ball_is_is_reported():
 
 
 @pytest.mark.parametrize("spin", [None, (0.0, 0.0, 0.0)])
-def test_friction_takes_a_ball_along_with_the_wall_where_they_touch(spin):
+def test_friction_takes_a_ball_along_with_the_wall_where_they_touch(spin, tmp_path):
     """Without a spin it leaves as fast as the drum is at its surface; with one that is 2/7 of it."""
     drum = swarm.Cylinder(1.0, friction=100.0, restitution=0.5, motion=swarm.Rotation((0.0, 0.0, 1.0), 2.0))
     turns = None if spin is None else np.array(spin)[:, None]
     ball = swarm.Particles([[0.0], [0.0], [0.0]], [[1.0], [0.0], [0.0]], radius=0.2, spin=turns)
-    end = swarm.simulate(swarm.Scene([drum]), ball, swarm.Impact(), until=0.9, compile="never")
+    end = swarm.simulate(
+        swarm.Scene([drum]), ball, swarm.Impact(), until=0.9, compile="never", impacts=tmp_path / "log.h5"
+    )
     along = 2.0 if spin is None else 2.0 * 2.0 / 7.0
     assert end.particles.velocity[:, 0] == pytest.approx([-0.5, along, 0.0], abs=1e-14)
     assert end.observables["energy_error"].max() < 1e-14
+    assert swarm.load_impacts(tmp_path / "log.h5").table()["slip"] == pytest.approx(
+        np.array([[0.0, -2.0, 0.0]]), abs=1e-14
+    )

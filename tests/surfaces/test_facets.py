@@ -276,13 +276,13 @@ def thick():
 def test_what_is_lost_behind_a_facet_is_as_deep_as_it_is_far_from_the_mesh(made, side, share):
     """Beyond its grid, and in it: all but what is as near to a facet that it is before."""
     mesh = swarm.Mesh(*made(), side)
-    points = np.random.default_rng(5).uniform(-1.5, 1.5, (3, 1000))
+    points = np.random.default_rng(5).uniform(-1.5, 1.5, (3, 400))
     outside = (1.0 if side == "inside" else -1.0) * mesh.phi(points)
     walls = swarm.Scene([mesh]).compiled().walls()
     deep = np.array([penetration(walls, Vec(*point)) for point in points.T.tolist()])
     seen = deep > 0.0
     assert np.abs(deep - outside)[seen].max() < 1e-14
-    assert seen.sum() >= share * (outside > 0.0).sum() > 15
+    assert seen.sum() >= share * (outside > 0.0).sum() > 5
     # Where the walls are not there nothing is lost.
     absent = walls._replace(each=(walls.each[0]._replace(members=walls.each[0].members.gone()),))
     assert all(penetration(absent, Vec(*point)) == 0.0 for point in points.T[:100].tolist())

@@ -66,7 +66,8 @@ def bounce(box, flock, books, clock, i, now):
     flock.put(i, now if flock.holds is None else now + select(ended == STAYS, after.wait, 0.0), r, v1)
     flock.keep(i, after.twice_energy)
     struck = Struck(i, wall, moment_of(clock, now), r, v, v1, box.kinds.mass_of(i) * after.impulse)
-    struck = box.watchers.with_slip(box.laws, walls, struck)
+    touch = r + box.kinds.radius_of(i) * walls.unit_normal(wall, r)
+    struck = box.watchers.with_slip(box.laws, walls, struck, touch)
     box.watchers.hit(books.image, struck._replace(wall=box.owner(wall)))
     if flock.holds is not None and ended == STAYS:
         flock.aim_at(i, HELD - wall)

@@ -145,11 +145,15 @@ class Log(NamedTuple):
         """Whether a particle has rows."""
         return True if self.chosen is None else self.chosen[index(particle)]
 
-    def with_slip(self, laws, now, struck):
-        """A `Struck` with the velocity along the wall, where the log has that; `now` are the walls at that time."""
+    def with_slip(self, laws, now, struck, touch=None):
+        """A `Struck` with the velocity along the wall, where the log has that; `now` are the walls at that time.
+
+        A ball is in contact with the wall at `touch`; None: at its place.
+        """
         if self.slip is None:
             return struck
-        n, u = now.unit_normal(struck.wall, struck.r), wall_velocity(laws.moving, now, struck.wall, struck.r)
+        place = struck.r if touch is None else touch
+        n, u = now.unit_normal(struck.wall, struck.r), wall_velocity(laws.moving, now, struck.wall, place)
         before = relative(u, struck.before)
         return struck._replace(slip=before - dot(before, n) * n)
 

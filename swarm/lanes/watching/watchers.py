@@ -25,9 +25,9 @@ class Watchers(NamedTuple):
         """Those that watch impacts."""
         return tuple(one for one in (self.log, self.counts) if one is not None)
 
-    def with_slip(self, laws, now, struck):
+    def with_slip(self, laws, now, struck, touch=None):
         """A `log.Struck` with its slip, where that is logged; `now` are the walls at that time."""
-        return struck if self.log is None else self.log.with_slip(laws, now, struck)
+        return struck if self.log is None else self.log.with_slip(laws, now, struck, touch)
 
     def hit(self, image, struck):
         """An impact, a `log.Struck`; `image` has the cells of the particles, where the scene repeats."""
