@@ -49,6 +49,8 @@ their ends; and again when corners that two rooms have in common were no edges a
 rooms have in one place became one wall: the same ends by the bits, and a number fewer for each of these walls.
 Seven cells of grains were written again when changes of impulses became relative to how fast two meet, not to how fast
 both go: 2e-12 at the ends that are here, for sweeps end one later.
+Three cells of grains where pairs rub, or a ball that spins, were written again when friction was swept until its
+changes are 2e-2, with 2e-3 for contacts that leave others as they are, not 1e-2 and 3e-3: 5e-9 at the end that is here.
 
 The runs "cell: ..." are those of cells of `bench.cells` that work, one kind of wall for each engine and capability, and
 their digests are of the final state, the observables and the datasets of the trajectory, but for dates, versions,
