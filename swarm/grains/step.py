@@ -46,10 +46,11 @@ from .vessel import SweptWall, moves, sweep_of
 # A sweep after which the next one would change no impulse by more than this part is the last one; also one that gains
 # no more than half of the one before, if that is round-off of what many large impulses leave of one another.
 _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
-# Where friction acts at every contact, and a damper: a thousandth of `_RUBBED`, which is what errors are made of. They
-# are the same to four digits as with normal impulses to round-off: of positions and velocities in piles that fall, and
-# that lie.
-_BESIDE_FRICTION = 1e-11
+# Where friction acts at every contact, and a damper: 1e-4 of what moves there. Positions, velocities and spins of piles
+# that fall, roll and lie are the same to three digits as with normal impulses to round-off, overlaps to 1e-9 of a
+# radius, of which friction leaves 1e-8 to 6e-6. (Rejected: 1e-9, a sweep less as grains fall, and 2e-6 of a radius in
+# a heap of eight.)
+_BESIDE_FRICTION = 1e-10
 # A sweep is not counted on to change less than this part of what the one before did.
 _LEAST_RATIO = 0.1
 # Of impulses of friction; what is left of a slip is seen again by the next step, which begins with them. More digits
@@ -281,7 +282,7 @@ def _solve(matter, walls, world):
         before = worst
         share, best, since = _stalled((share, best, since), worst)
     books.sweeps[0] += sweeps
-    if worst > _NEARLY:
+    if worst > _NEARLY and follows > solved:
         lags = 1
     books.lagging[0] += lags
     return worst <= _LAGGING
