@@ -19,7 +19,7 @@ from .grain_arrays import (
     DRAG,
     GAP,
     IMPULSE,
-    LISTED,
+    PLACE,
     PUSH,
     RADIUS,
     RUBBED,
@@ -84,7 +84,7 @@ _SLIP, _SPINS, _READ = 0, 8, 24
 _VIRIAL, _END, _LOST, _BOOKED = 0, 1, 2, 3
 
 
-def _weigh(matter, rows, q, lane, read, booked):
+def _weigh(matter, rows, q, lane, read, booked, notes):
     """Compute what is booked of a contact."""
     s0, impulse = vector_in(rows, q + START, lane), vector_in(rows, q + IMPULSE, lane)
     move = move_in(matter, rows, q, lane, slip_in(read, _SLIP, lane))
@@ -96,7 +96,8 @@ def _weigh(matter, rows, q, lane, read, booked):
         gained, lines = dot(vector_in(rows, q + DRAG, lane), move) / matter.h, (_SPINS, _SPINS + COLUMNS_OF_BALLS)
         turned = turning_in(read, *lines, BEFORE, lane) + turning_in(read, *lines, AFTER, lane)
         gained = gained - 0.5 * dot(twist_in(rows, q, lane, move), turned)
-        rows[q + RUBBED, lane] = -gained
+        if notes:
+            rows[q + RUBBED, lane] = -gained
         lost = lost - gained
     booked[_LOST, lane] = 0.5 * lost
 
@@ -113,8 +114,11 @@ def _enter(matter, books, rows, q, lane, numbers, booked):
 
 
 @outlined
-def book_pairs(matter, grains, near, touches, books):
-    """Book the contacts of pairs, and keep their friction for the next step; their largest overlap [m]."""
+def book_pairs(matter, grains, near, touches, books, notes):
+    """Book the contacts of pairs, and keep their friction for the next step; their largest overlap [m].
+
+    `notes` says whether what friction takes of each is asked for.
+    """
     number, deepest, virial = grains.number, 0.0, 0.0
     read, booked = unwritten((_READ, LANES), np.float64), unwritten((_BOOKED, LANES), np.float64)
     for g in range(touches.used[1]):
@@ -124,7 +128,7 @@ def book_pairs(matter, grains, near, touches, books):
         if matter.pairs.friction is not None:
             read_lines(grains.spin, ends, e, read, _SPINS)
         for k in over_lanes(lanes_between(0, lanes)):
-            _weigh(matter, rows, q, index(k), read, booked)
+            _weigh(matter, rows, q, index(k), read, booked, notes)
         for k in range(lanes):
             lane = index(k)
             i, j = balls_of(ends, e, lane)
@@ -132,7 +136,7 @@ def book_pairs(matter, grains, near, touches, books):
             deepest = worse(booked[_END, lane], worse(rows[q + GAP, lane], deepest))
             _enter(matter, books, rows, q, lane, (index(number[i]), index(number[j])), booked)
             if matter.pairs.friction is not None:
-                listed = index(int(rows[q + LISTED, lane]))
+                listed = index(ends[e + PLACE, lane])
                 set_vector(near.drag, listed, 0, vector_in(rows, q + DRAG, lane))
     books.virial[0] += virial
     return deepest

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..kernel.arrays import aligned, aligned_copy, spaced
+from ..kernel.arrays import aligned, aligned_copy, index, spaced
 from ..kernel.jit import Array
 from ..kernel.lines import LANES
 from ..kernel.record import Record
@@ -32,10 +32,10 @@ START, SIZE, GAP, PUSH, IMPULSE, COAST, DAMPING, GAIN, SCALE, EASES = 0, 3, 4, 5
 COLUMNS_SWEPT = 17
 # The inverse of the mass that moves, the impulse of friction, and of a pair 1/(R_i + R_j) and what turns both balls.
 EASE, DRAG, NEARNESS, LEVERS, COLUMNS_RUBBED = 17, 18, 21, 22, 24
-# The place in the lists, the angular impulse of the resistance to rolling, and what both take.
+# Of a wall the place in the lists, the angular impulse of the resistance to rolling, and what both take.
 LISTED, ROLL, RUBBED, COLUMNS = 24, 25, 28, 29
-# Columns of `Touches.found`: both balls, and the place in the lists. Rows of `Tile.ends`: both balls.
-ONE, OTHER, PLACE, FOUND, ENDS = 0, 1, 2, 3, 2
+# Columns of `Touches.found`, and rows of a group in `Tile.ends`: both balls, and the place in the lists.
+ONE, OTHER, PLACE, FOUND, ENDS = 0, 1, 2, 3, 3
 # Columns of `Touches.course`: the centre at the start of a step, the radius, the move in the step, and 1/mass: what is
 # asked of every pair that is listed is then in one line.
 FROM, EXTENT, MOVE, YIELDING = 0, 3, 4, 7
@@ -124,6 +124,11 @@ class OfWall(Record):
     rows: Any
     c: Any
 
+    @property
+    def listed(self):
+        """The place in the lists."""
+        return index(int(self.rows[self.c, LISTED]))
+
     def number(self, k):
         """What is in a column."""
         return self.rows[self.c, k]
@@ -138,11 +143,18 @@ class OfWall(Record):
 
 
 class OfPair(Record):
-    """A contact of a pair: the first row of its group, and its lane."""
+    """A contact of a pair: the first rows of its group, of its numbers and of the balls, and its lane."""
 
     rows: Any
     q: Any
+    ends: Any
+    e: Any
     lane: Any
+
+    @property
+    def listed(self):
+        """The place in the lists."""
+        return index(self.ends[self.e + PLACE, self.lane])
 
     def number(self, k):
         """What is in a column."""

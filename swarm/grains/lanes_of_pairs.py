@@ -53,7 +53,6 @@ from .grain_arrays import (
     LEVER,
     LEVERS,
     LIGHTNESS,
-    LISTED,
     LOST,
     NEARNESS,
     ONE,
@@ -128,7 +127,7 @@ def turning_in(tile, one, other, column, lane):
 def pair_at(touches, g, lane):
     """A contact of a group, and its balls."""
     rows, q, ends, e = of_group(touches, g)
-    return OfPair(rows, q, lane), balls_of(ends, e, lane)
+    return OfPair(rows, q, ends, e, lane), balls_of(ends, e, lane)
 
 
 def move_in(matter, rows, q, lane, difference):
@@ -146,9 +145,10 @@ _IMPULSES, _TWISTS, _READ = 40, 48, 56
 
 def _lay(touches, g, lane, c):
     """Give a contact that has been found a lane."""
-    rows, q, ends, e = of_group(touches, g)
-    ends[e, lane], ends[e + 1, lane] = touches.found[c, ONE], touches.found[c, OTHER]
-    rows[q + LISTED, lane] = touches.found[c, PLACE]
+    # Nothing of its rows, which are not in the cache yet.
+    _rows, _q, ends, e = of_group(touches, g)
+    for k in (ONE, OTHER, PLACE):
+        ends[e + k, lane] = touches.found[c, k]
 
 
 @outlined
@@ -164,7 +164,7 @@ def _begin_group(matter, grains, near, touches, group):
         # Of the second ball in the next group, which has been laid; the first one is often that of this group.
         _fetch_ball(grains, index(ends[e + ENDS + 1, index(k)]))
         if near.drag is not None:
-            fetch(near.drag, int(rows[q + COLUMNS + LISTED, index(k)]) * near.drag.shape[1])
+            fetch(near.drag, ends[e + ENDS + PLACE, index(k)] * near.drag.shape[1])
     read_lines(grains.place, ends, e, read, _PLACE)
     read_lines(grains.speed, ends, e, read, _SPEED)
     if matter.pairs.friction is not None:
@@ -172,7 +172,7 @@ def _begin_group(matter, grains, near, touches, group):
         into_lanes(read, _TURNS + FOUR, spin, FOUR, ends, e + 1)
     if near.drag is not None:
         for k in range(begin, end):
-            lane, listed = index(k), index(int(rows[q + LISTED, index(k)]))
+            lane, listed = index(k), index(ends[e + PLACE, index(k)])
             if matter.pairs.friction is not None:
                 set_vector_in(rows, q + DRAG, lane, vector_at(near.drag, listed, 0))
             if matter.pairs.rolling is not None:

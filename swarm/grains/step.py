@@ -337,7 +337,9 @@ def _log(matter, walls, world, time):
 def _book(matter, walls, world):
     """Book what the contacts of the step did; the largest overlap [m]."""
     grains, near, touches, books = world.grains, world.near, world.touches, world.books
-    deepest = book_pairs(matter, grains, near, touches, books)
+    # A line of each group that nothing else is in.
+    notes = world.noting is not None or matter.pairs.rolling is not None
+    deepest = book_pairs(matter, grains, near, touches, books, notes)
     if matter.pairs.rolling is not None:
         book_rolling_pairs(grains, near, touches, books)
     for k, wall in enumerate(walls.each):
