@@ -8,6 +8,7 @@ import pytest
 import swarm
 from swarm.kernel.vector import Vec
 from swarm.surfaces.balls import joined_faces
+from swarm.surfaces.rotation import matrix
 
 BOXES = swarm.Union([swarm.Box((0.5, 0.5, 0.5)), swarm.Box((0.6, 0.2, 0.25), (0.9, 0.1, 0.05))])
 SPHERES = swarm.Union([swarm.Sphere(0.5), swarm.Sphere(0.4, (0.6, 0.1, 0.0))])
@@ -161,6 +162,21 @@ SHORT = swarm.Union([
     swarm.Box((1.0, 1.0, 1.0), (-0.8, 0.0, 0.0)), swarm.Box((0.7, 0.9, 0.5), (0.6, 0.2, 0.1)),
     swarm.Sphere(0.9, (0.0, 0.5, 0.8)),
 ])  # fmt: skip
+
+
+@pytest.mark.parametrize("pull", [None, (0.3, -0.2, -1.0)], ids=["straight", "fall"])
+def test_a_turned_box_of_two_that_overlap_is_met_as_one(pull):
+    """Each side is in the plane of a side of both boxes, up to round-off of the turn: it is seen where they overlap."""
+    turn = {"axis": (0.3, -0.2, 1.0), "angle": 0.7}
+    whole = swarm.Box((0.7, 0.5, 0.4), rotation=turn)
+    x, y, z = matrix(whole.rotation).T
+    halves = [swarm.Box((0.45, 0.5, 0.4), tuple(k * x), rotation=turn) for k in (-0.25, 0.25)]
+    rng = np.random.default_rng(1)
+    for _flight in range(20):
+        a, b, c = rng.uniform(-1.0, 1.0, 3) * (0.5, 0.3, 0.2)
+        place, velocity = a * x + b * y + c * z, rng.normal(size=3)
+        times = [met(one, 0.1, place, velocity, pull)[0] for one in (swarm.Union(halves), whole)]
+        assert times[0] == pytest.approx(times[1], rel=1e-9)
 
 
 @pytest.mark.parametrize("radius", [0.02, 0.1])

@@ -278,7 +278,7 @@ def at_least(wall, r):
 def _at_least_to(wall, face, r):
     """The same of a face. Where its foot is hidden, the seen part is beside it, perhaps without an edge there."""
     away, n, flat = face.wall.distance(r), outward(face.wall, r), isinstance(face.wall, FLAT)
-    depth = max(hidden(wall.rooms, face.rooms, r - away * n, n if flat else ZERO), 0.0)
+    depth = max(hidden(wall.rooms, face.rooms, r - away * n, n if flat else ZERO, wall.slack), 0.0)
     return math.sqrt(away * away + depth * depth) if flat else max(abs(away), depth - abs(away))
 
 
@@ -289,7 +289,7 @@ def outward(wall, r):
 
 def is_seen(rooms, own, place, slack):
     """Whether a place of a face or an edge is in its own rooms and in no other one."""
-    return hidden(rooms, own, place, ZERO) <= slack
+    return hidden(rooms, own, place, ZERO, slack) <= slack
 
 
 def gap_of(rooms, place):
@@ -304,16 +304,18 @@ def gap_of(rooms, place):
 
 
 @outlined
-def hidden(rooms, own, place, n):
+def hidden(rooms, own, place, n, slack):
     """A lower bound of the distance from a place of a face or an edge to where that is seen; 0 or less if it is seen.
 
-    A place that moves along a flat face with the normal n stays inside of the walls that are parallel to it.
+    A place that moves along a flat face with the normal n stays inside of the walls that are parallel to it, but not of
+    those in the plane of the face, where round-off says on which side it is.
 
     Args:
         rooms: the walls of each room of the union.
         own: the numbers of the rooms that the face or the edge belongs to.
         place: the place.
         n: the unit normal of a flat face, else 0.
+        slack: round-off of a place [m].
     """
     depth = -math.inf
     for k, room in enumerate(rooms):
@@ -323,7 +325,7 @@ def hidden(rooms, own, place, n):
             inside = max(inside, away)
             if isinstance(wall, FLAT):
                 turn = dot(n, outward(wall, place))
-                away = select((away < 0.0) & (turn * turn > _ALIGNED), -math.inf, away)
+                away = select((away < -slack) & (turn * turn > _ALIGNED), -math.inf, away)
             outside = max(outside, away)
         is_own = own[0] == k
         for number in own[1:]:
@@ -456,7 +458,8 @@ def _until_face(wall, face, flight):
     p = flight.r
     away, n = face.wall.distance(p), outward(face.wall, p)
     foot = p - away * n
-    depth, step = hidden(wall.rooms, face.rooms, foot, n if isinstance(face.wall, FLAT) else ZERO), 0.0
+    along, step = n if isinstance(face.wall, FLAT) else ZERO, 0.0
+    depth = hidden(wall.rooms, face.rooms, foot, along, wall.slack)
     # A face is seen from inside of its own room alone.
     faces = depth <= wall.slack and away <= 0.0
     if faces or away <= -wall.radius:
@@ -480,7 +483,7 @@ def _until_edge(wall, edge, flight):
     foot = crossing(edge.one, edge.other, p, _FAR * wall.radius)
     if max(abs(edge.one.distance(foot)), abs(edge.other.distance(foot))) > wall.slack:
         return _until_seen(wall, least, _UNFOUND * wall.radius, flight)
-    away, depth = norm(foot - p), hidden(wall.rooms, edge.rooms, foot, ZERO)
+    away, depth = norm(foot - p), hidden(wall.rooms, edge.rooms, foot, ZERO, wall.slack)
     if depth > wall.slack:
         return _until_seen(wall, away, max(_way_of_foot(edge.bend, 0.0, away, depth), _LEAST * depth), flight)
     return flight.until_rim(Rim(edge.bend, foot, away, wall.radius))
