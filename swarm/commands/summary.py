@@ -10,6 +10,7 @@ from ..observables import drift
 from ..run.result import Result
 from ..words import facts
 from ..words.amounts import amount
+from ..words.unfinished import unfinished
 
 # Of these JSON has the value at the end, or the largest.
 _OF_BALLS = ("collisions", "largest_overlap")
@@ -46,14 +47,19 @@ def _at_the_end(seen: dict[str, Any], name: str) -> Any:
 
 
 def of_file(file: Path) -> dict[str, str]:
-    """The content of an HDF5 file, a trajectory or a log of impacts, and whether all values match their checksums."""
+    """The content of an HDF5 file, a trajectory or a log of impacts, and whether all values match their checksums.
+
+    Of a run that goes on or was cut the first row says so.
+    """
     from ..files.impact_log import load_impacts
     from ..files.stored import is_log
     from ..files.trajectory import load
 
     if not is_log(file):
         with load(file) as trajectory:
-            return facts.of_trajectory(trajectory) | facts.of_checksums(trajectory)
+            cut = unfinished(trajectory)
+            state = {} if cut is None else {"state": " ".join(cut).strip()}
+            return state | facts.of_trajectory(trajectory) | facts.of_checksums(trajectory)
     with load_impacts(file) as log:
         return facts.of_log(log) | facts.of_checksums(log)
 

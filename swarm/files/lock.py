@@ -40,3 +40,17 @@ def only_writer(target: Path, what: str = "trajectory", patience: float = 0.0) -
         with contextlib.suppress(OSError):
             path.unlink(missing_ok=True)
         lock.release()
+
+
+def is_written(target: Path) -> bool:
+    """Whether a run writes this file now: it holds the lock beside it."""
+    lock = paths.lock_of(target)
+    if not lock.exists():
+        return False
+    import filelock
+
+    try:
+        with filelock.FileLock(lock, timeout=0.0):
+            return False
+    except (filelock.Timeout, OSError):
+        return True

@@ -122,7 +122,8 @@ def _given(row: dict[str, Any], sweep: Any) -> str:
 
 def _notes(sweep: Any, states: list[str]) -> list[Any]:
     """Whether the sweep goes on, or was stopped."""
-    from ..pages.of_run import Note, is_written
+    from ..files.lock import is_written
+    from ..words.unfinished import Note
 
     waiting = states.count("waiting")
     if sweep.table is not None and is_written(sweep.table):

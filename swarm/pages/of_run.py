@@ -7,24 +7,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import SceneError
-from ..files import paths
 from ..words import facts, verdicts
 from ..words import titles as words
 from ..words.amounts import amount, many
 from ..words.content import Content, content_of
 from ..words.statements import Statement
+from ..words.unfinished import Note, unfinished
 from . import html, pictures, reproduce
 from .html import Page, filled
 
 # Of the first screen: the most numbers, and the most surfaces.
 _NUMBERS, _SURFACES = 4, 3
-
-
-class Note(NamedTuple):
-    """A sentence that stands above all, and a command that goes with it, or ""."""
-
-    text: str
-    command: str = ""
 
 
 class Answer(NamedTuple):
@@ -55,7 +48,9 @@ def of_trajectory(trajectory: Any) -> Page:
     spent = None if wall_times is None else float(wall_times[-1])
     about = " · ".join([trajectory.path.name, *_when(makers, trajectory.path), facts.file_size(trajectory.path)])
     speed = _speed(content, spent, trajectory.threads) + _versions(makers, trajectory.seed)
-    made = _filled(content, spent, about, _notes(trajectory), speed, reproduce.of_trajectory(trajectory))
+    cut = unfinished(trajectory)
+    notes = [] if cut is None else [cut]
+    made = _filled(content, spent, about, notes, speed, reproduce.of_trajectory(trajectory))
     return Page(words.title(content), made, (trajectory.path,))
 
 
@@ -115,51 +110,6 @@ def _when(makers: dict[str, str], path: Path) -> list[str]:
         return [f"run on {moment.day} {moment:%B %Y, %H:%M} UTC"]
     moment = datetime.datetime.fromtimestamp(path.stat().st_mtime, datetime.UTC)
     return [f"file of {moment.day} {moment:%B %Y, %H:%M} UTC"]
-
-
-def _notes(trajectory: Any) -> list[Note]:
-    """Whether the run goes on, or was cut."""
-    last = float(trajectory.times[-1])
-    until = trajectory.until
-    if until is None and trajectory.scene_text is not None:
-        until = _until_of(trajectory.scene_text)
-    if is_written(trajectory.path):
-        end = "" if until is None else f" of {amount(until, 's')}"
-        return [Note(f"A run writes this file now: this page shows its first {amount(last, 's')}{end}.")]
-    saved = paths.checkpoint_of(trajectory.path)
-    if until is not None and last < until * (1.0 - 1e-9):
-        text = f"This run is not complete: it was stopped at {amount(last, 's')} of {amount(until, 's')}."
-    elif saved.exists():
-        text = f"This run may not be complete: there is the checkpoint {saved.name}, from which it can go on."
-    else:
-        return []
-    if not saved.exists():
-        return [Note(f"{text} There is no checkpoint beside it to go on from.")]
-    if trajectory.scene_text is None:
-        return [Note(f"{text} Go on with it by the script that began it, with resume=True.")]
-    return [Note(f"{text} Go on with it:", f"swarm run {trajectory.path.stem}.toml -o {trajectory.path.name} --resume")]
-
-
-def _until_of(text: str) -> float | None:
-    """The end of the run of a scene file [s]."""
-    import tomllib
-
-    until = tomllib.loads(text).get("run", {}).get("until")
-    return float(until) if isinstance(until, (int, float)) else None
-
-
-def is_written(path: Path) -> bool:
-    """Whether a run writes this file now: it holds the lock beside it."""
-    lock = paths.lock_of(path)
-    if not lock.exists():
-        return False
-    import filelock
-
-    try:
-        with filelock.FileLock(lock, timeout=0.0):
-            return False
-    except (filelock.Timeout, OSError):
-        return True
 
 
 def _speed(content: Content, spent: float | None, threads: int | None) -> list[tuple[str, str]]:

@@ -1,0 +1,48 @@
+"""Whether the run of a trajectory has come to its end, and how it goes on."""
+
+from typing import Any, NamedTuple
+
+from ..files import paths
+from ..files.lock import is_written
+from .amounts import amount
+
+# A frame at the end of a run is there to round-off.
+_ROUND_OFF = 1e-9
+
+
+class Note(NamedTuple):
+    """A sentence on a run, and a command that goes with it, or ""."""
+
+    text: str
+    command: str = ""
+
+
+def unfinished(trajectory: Any) -> Note | None:
+    """Of a run that goes on or was cut, what to know about it; None: it is complete, as far as the file says."""
+    times, until = trajectory.times, trajectory.until
+    last = float(times[-1]) if len(times) else 0.0
+    if until is None and trajectory.scene_text is not None:
+        until = _until_of(trajectory.scene_text)
+    if is_written(trajectory.path):
+        end = "" if until is None else f" of {amount(until, 's')}"
+        return Note(f"A run writes this file now: it holds the first {amount(last, 's')}{end}.")
+    saved = paths.checkpoint_of(trajectory.path)
+    if until is not None and last < until * (1.0 - _ROUND_OFF):
+        text = f"This run is not complete: it was stopped at {amount(last, 's')} of {amount(until, 's')}."
+    elif saved.exists():
+        text = f"This run may not be complete: there is the checkpoint {saved.name}, from which it can go on."
+    else:
+        return None
+    if not saved.exists():
+        return Note(f"{text} There is no checkpoint beside it to go on from.")
+    if trajectory.scene_text is None:
+        return Note(f"{text} Go on with it by the script that began it, with resume=True.")
+    return Note(f"{text} Go on with it:", f"swarm run {trajectory.path.stem}.toml -o {trajectory.path.name} --resume")
+
+
+def _until_of(text: str) -> float | None:
+    """The end of the run of a scene file [s]."""
+    import tomllib
+
+    until = tomllib.loads(text).get("run", {}).get("until")
+    return float(until) if isinstance(until, (int, float)) else None
