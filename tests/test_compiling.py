@@ -7,8 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import swarm
 from swarm.kernel import cache
 from swarm.kernel.compiling import Compilations
+from swarm.run import machine
 
 
 def named(name):
@@ -59,16 +61,23 @@ def test_every_kernel_of_a_run_has_words(run):
     assert names <= compiling._WORDS.keys()
 
 
+def test_a_compilation_takes_long_for_walls_only_where_there_are_some():
+    rough = swarm.Box((0.1, 0.1, 0.1), friction=0.5, motion=swarm.Rotation((0.0, 0.0, 1.0), 1.0), side="outside")
+    cavity = swarm.Sphere(1.0, friction=0.5)
+    assert machine._why_slow(swarm.Scene([cavity, rough])) == ""
+    assert machine._why_slow(swarm.Scene([cavity, rough, rough])).startswith("each of the 2 walls that move ")
+
+
 def test_a_compilation_that_takes_long_is_a_warning(monkeypatch, caplog):
     """Once, while it goes on; one that has ended warns of nothing."""
     monkeypatch.setattr(cache, "LONG", 0.01)
-    with cache.kernels_compiled(lambda sentence: None):
+    with cache.kernels_compiled(lambda sentence: None, why="walls are many"):
         listener = cache.listeners[-1]
         listener.begins(named("sin"), True)
         while not caplog.messages:
             time.sleep(0.01)
         listener.ends()
-        assert caplog.messages[0].startswith("compiling a kernel, once: sin: it takes more than 10 s so far; ")
+        assert caplog.messages == ["compiling a kernel, once: sin: it takes more than 10 s so far; walls are many"]
         monkeypatch.setattr(cache, "LONG", 60.0)
         before = set(threading.enumerate())
         listener.begins(named("cos"), True)

@@ -22,10 +22,7 @@ _COMPILING = "compiling a kernel, once: {}"
 _LOG = logging.getLogger("swarm")
 # A compilation that takes longer [s] is a warning, for not every run shows what is compiled.
 LONG = 10.0
-_SLOW = (
-    f"it takes more than {LONG:g} s so far; where walls that move have friction, each of them adds some seconds; "
-    "the triangles of one Mesh do not"
-)
+_SLOW = f"it takes more than {LONG:g} s so far"
 
 
 def base() -> Path:
@@ -86,10 +83,12 @@ class Listener:
     Args:
         tell: is given a sentence about each kernel.
         sentence: makes it of the kernel; None: its name.
+        why: why a compilation may take long, or "".
     """
 
-    def __init__(self, tell: Callable[[str], None], sentence: Callable[[Any], str] | None) -> None:
+    def __init__(self, tell: Callable[[str], None], sentence: Callable[[Any], str] | None, why: str = "") -> None:
         self._tell, self._sentence, self._begun = tell, sentence, list[float]()
+        self._slow = f"{_SLOW}; {why}" if why else _SLOW
         self._timer: threading.Timer | None = None
         self.spent = Spent()
 
@@ -101,7 +100,7 @@ class Listener:
             _LOG.info(message)
             self._tell(message)
             self._end_timer()
-            self._timer = threading.Timer(LONG, _LOG.warning, (f"{message}: {_SLOW}",))
+            self._timer = threading.Timer(LONG, _LOG.warning, (f"{message}: {self._slow}",))
             self._timer.daemon = True
             self._timer.start()
 
@@ -127,9 +126,11 @@ listeners: list[Listener] = []
 
 
 @contextlib.contextmanager
-def kernels_compiled(tell: Callable[[str], None], sentence: Callable[[Any], str] | None = None) -> Iterator[Spent]:
-    """Report every kernel that is compiled in this context to the logger and to `tell`, in its `sentence`."""
-    one = Listener(tell, sentence)
+def kernels_compiled(
+    tell: Callable[[str], None], sentence: Callable[[Any], str] | None = None, why: str = ""
+) -> Iterator[Spent]:
+    """Report every kernel that is compiled in this context to the logger and to `tell`: the arguments of `Listener`."""
+    one = Listener(tell, sentence, why)
     listeners.append(one)
     try:
         yield one.spent

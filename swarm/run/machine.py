@@ -18,6 +18,7 @@ from ..common.snapshot import NOTHING, Read, Snapshot
 from ..kernel.cache import kernels_compiled
 from ..kernel.compiling import Compilations
 from ..particles import Particles
+from ..scene import Scene
 from ..state import Absorbed, Multipliers
 from . import failures
 from .base import BaseRun
@@ -141,7 +142,7 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
     shown, compilations = display(task.options.progress), Compilations()
     with (
         session, interrupt.taken_by(stop), shown as show,
-        kernels_compiled(show.compiling, compilations.sentence) as session.compiled,
+        kernels_compiled(show.compiling, compilations.sentence, _why_slow(task.scene)) as session.compiled,
     ):  # fmt: skip
         session.prepare(task, watched.log)
         measures = _measures_of(task, session)
@@ -154,6 +155,14 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
         compilations.calls = run.calls
         session.restore(run)
         yield run, writer_of(task, session, recorder, watched.log), show, watched, measures
+
+
+def _why_slow(scene: Scene) -> str:
+    """Why kernels of this scene may take long to compile, or "": one wall has no fewer to be made of."""
+    rough = sum(one.motion is not None and bool(one.friction) for one in scene.surfaces)
+    if rough < 2:
+        return ""
+    return f"each of the {rough} walls that move and have friction adds some seconds; the triangles of one Mesh do not"
 
 
 def _measures_of(task: Task, session: Session) -> Measures:
