@@ -54,6 +54,30 @@ def test_hints_are_given(name, caplog):
         assert part in hints[0]
 
 
+def test_kelvins_in_place_of_joules(caplog):
+    """A temperature is k_B T: 300 J make a molecule faster than light, at the start or at a wall."""
+    room, molecule = swarm.Scene([BOX]), 4.65e-26
+    given = swarm.fill(room, 5, temperature=300.0, mass=molecule)
+    (hint,) = hints_of(room, particles=given, until=1e-6, caplog=caplog)
+    assert hint.startswith("a particle has ")
+    assert "k_B T in J, at 300 K 4.14e-21 J" in hint
+    with pytest.raises(swarm.SceneError, match=r"above the speed of light, .* at 300 K 4\.14e-21 J"):
+        hints_of(room, particles=given, caplog=caplog)
+    warm = swarm.Scene([swarm.Sphere(0.5, temperature=300.0)])
+    (hint,) = hints_of(warm, particles=swarm.fill(warm, 5, speed=400.0, mass=molecule), until=1e-3, caplog=caplog)
+    assert hint.startswith("a wall of the temperature 300 J gives 8e+13 m/s")
+    right = swarm.fill(room, 5, temperature=4.14e-21, mass=molecule)
+    assert hints_of(room, particles=right, until=1e-3, caplog=caplog) == []
+
+
+def test_degrees_in_place_of_radians(caplog):
+    swarm.Box((0.1, 0.1, 0.1), rotation={"axis": (0, 0, 1), "angle": 6.2})
+    assert caplog.messages == []
+    swarm.Box((0.1, 0.1, 0.1), rotation={"axis": (0, 0, 1), "angle": 45})
+    (hint,) = caplog.messages
+    assert hint == ("rotation.angle = 45 rad is more than a turn; angles are in radians: 45 degrees are 0.785398")
+
+
 def test_what_rests_and_what_falls(caplog):
     (hint,) = hints_of(swarm.Scene([BOX]), particles=AT_REST, caplog=caplog)
     assert "all 1 particles are at rest" in hint

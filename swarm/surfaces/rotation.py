@@ -1,5 +1,6 @@
 """Rotations as unit quaternions (w, x, y, z): what an argument may say, and what follows from it."""
 
+import logging
 import math
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -16,6 +17,7 @@ from ..kernel.vector import Vec, absolute, dot, vec
 from ..motion.wall import product as product
 from .frames import Framed
 
+_LOG = logging.getLogger("swarm")
 Quaternion = tuple[float, float, float, float]
 # How far the products of the rows of a rotation matrix may be from those of unit vectors: single precision in a file.
 _ORTHONORMAL = 1e-6
@@ -41,7 +43,13 @@ def quaternion(name: str, value: Any) -> Quaternion | None:
         if set(value) != {"axis", "angle"}:
             raise SceneError(f"{name} must have the keys axis and angle, got {sorted(map(str, value))}")
         axis = unit(f"{name}.axis", value["axis"])
-        half = 0.5 * number(f"{name}.angle", value["angle"], "a finite number of radians")
+        angle = number(f"{name}.angle", value["angle"], "a finite number of radians")
+        if abs(angle) > 2.0 * math.pi:
+            _LOG.warning(
+                "%s.angle = %g rad is more than a turn; angles are in radians: %g degrees are %.6g",
+                name, angle, angle, math.radians(angle),
+            )  # fmt: skip
+        half = 0.5 * angle
         turn = math.cos(half), *(math.sin(half) * part for part in axis)
     elif len(parts := parts_of(value) or ()) == 3 and all(parts_of(row) is not None for row in parts):
         turn = _of_matrix(name, value)

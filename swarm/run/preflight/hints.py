@@ -54,6 +54,7 @@ def give(task: Task) -> None:
     _warn_of_faces(task.scene)
     _warn_of_fall(task.compiled)
     _warn_of_counters(task)
+    _warn_of_light(task)
     softness.warn_of_depths(task)
     if task.bodies is None and task.particles.radius is None and len(task.particles):
         # The speed of the fastest in a sample.
@@ -129,6 +130,17 @@ def _warn_of_counters(task: Task) -> None:
                         j, i, k, radius,
                     )  # fmt: skip
                     return
+
+
+def _warn_of_light(task: Task) -> None:
+    """Warn where a temperature in kelvin, or a speed of another unit, makes particles faster than light."""
+    particles = task.particles
+    heat = max((one.temperature or 0.0 for one in task.scene.surfaces), default=0.0)
+    hot = math.sqrt(heat / float(particles.mass.min())) if len(particles) else 0.0
+    if own := workload.beyond_light(particles.fastest()):
+        _LOG.warning("a particle has %.2g m/s%s", particles.fastest(), own)
+    elif own := workload.beyond_light(hot):
+        _LOG.warning("a wall of the temperature %g J gives %.2g m/s%s", heat, hot, own)
 
 
 def _warn_of_rest(task: Task) -> None:

@@ -24,6 +24,9 @@ _PARTICLES, _PARTS = 4, 8
 # Chords of a walk through the volume, and how many of the last of them count.
 _CHORDS, _COUNTED = 60, 30
 
+# The speed of light [m/s], and k_B T at 300 K [J].
+_LIGHT, _ROOM = 299_792_458.0, 300.0 * 1.380649e-23
+
 
 class Flights(NamedTuple):
     """Typical time from impact to impact [s], and the wall that is hit most often."""
@@ -51,12 +54,13 @@ def require_few_impacts(
         # They may start in a narrow corner and leave it: then the volume around decides.
         found = max(found, _of_volume(compiled, particles, impact))
     if every > _MOST_A_FRAME * found.between:
-        i = int(compiled.numbering.members[0, found.wall])
+        i, fastest = int(compiled.numbering.members[0, found.wall]), particles.fastest()
         raise SceneError(
             f"a particle must take at most {_MOST_A_FRAME:g} impacts a frame, got about {every / found.between:.2g}: "
             f"at its speed it flies {found.between:.2g} s from impact to impact, mostly at surfaces[{i}] "
             f"({type(compiled.scene.surfaces[i]).__name__}), and a frame lasts {every:g} s; make that surface wider, "
             f"the particles slower, or every at most {_MOST_A_FRAME * found.between:.2g} s"
+            + (f"; the fastest has {fastest:.2g} m/s{beyond}" if (beyond := beyond_light(fastest)) else "")
         )
     impacts = len(particles) * (until / found.between)
     if impacts > _MANY:
@@ -64,6 +68,16 @@ def require_few_impacts(
             "the run will take about %.1e impacts, %.1e of each particle, which flies %.1e s from impact to impact",
             impacts, until / found.between, found.between,
         )  # fmt: skip
+
+
+def beyond_light(speed: float) -> str:
+    """What to add to a sentence on a speed [m/s] that only another unit can mean; else ""."""
+    if speed <= _LIGHT:
+        return ""
+    return (
+        ", which is above the speed of light, and swarm knows no relativity: speeds are in m/s, masses in kg, and a "
+        f"temperature is k_B T in J, at 300 K {_ROOM:.3g} J"
+    )
 
 
 def time_between(compiled: CompiledScene, particles: Particles) -> float:
