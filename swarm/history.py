@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .common import checks
 from .common.status import Status
 from .compiled_scene import CompiledScene
 from .contact import corner, reflection, uzawa
@@ -90,8 +91,7 @@ def contact_history(
     (13, True)
     """
     for name, value, kind in (("scene", scene, Scene), ("method", method, Method)):
-        if not isinstance(value, kind):
-            raise SceneError(f"{name} must be a swarm.{kind.__name__}, got {type(value).__name__}")
+        checks.of_class(name, value, kind)
     for i, surface in scene.pieces.owned():
         if surface.motion is not None or surface.reacts():
             raise SceneError(

@@ -1,10 +1,9 @@
 """What particles with a radius do to one another."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
+from .common import checks
 from .common.validated import Magnitude, Part, Validated
-from .errors import SceneError
 
 # Of soft contacts: the largest overlap that a start may have, as a part of the radius of the smaller ball.
 MOST_PRESSED = 0.2
@@ -41,8 +40,8 @@ class Pairs(Validated):
     rolling: Magnitude = field(default=0.0, metadata={"younger": True})
 
 
-def checked_pairs(value: Any) -> Pairs | None:
+def checked_pairs(value: Pairs | None) -> Pairs | None:
     """The argument `pairs` of a scene."""
-    if value is not None and not isinstance(value, Pairs):
-        raise SceneError(f"pairs must be a swarm.Pairs, got {type(value).__name__}")
+    if value is not None:
+        checks.of_class("pairs", value, Pairs)
     return value

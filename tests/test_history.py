@@ -290,7 +290,7 @@ def test_errors_name_the_argument(changes, parts):
 @pytest.mark.parametrize(
     ("changes", "parts"),
     [
-        ({"method": "uzawa"}, ["method", "swarm.Method", "str"]),
+        ({"method": "uzawa"}, ["method", "swarm.Method", "'uzawa'"]),
         ({"scene": swarm.Sphere(0.5)}, ["scene", "swarm.Scene", "Sphere"]),
     ],
 )

@@ -118,6 +118,20 @@ def test_forgotten_brackets_are_reported(given):
         swarm.Scene(given)
 
 
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [
+        (lambda: swarm.simulate(SCENE, START, swarm.Impact, until=1.0), "Impact"),
+        (lambda: swarm.Scene([swarm.Sphere(0.5)], pairs=swarm.Pairs), "Pairs"),
+        (lambda: swarm.Sphere(0.5, laws=[swarm.Lambert]), "Lambert"),
+        (lambda: swarm.simulate(SCENE, START, until=1.0, sources=[swarm.Source]), "Source"),
+    ],
+)
+def test_forgotten_brackets_of_other_arguments(given, name):
+    with pytest.raises(swarm.SceneError, match=rf"to make one of the class, call it: {name}\(\.\.\.\)$"):
+        given()
+
+
 def test_numbers_of_the_standard_library_are_numbers():
     exact = swarm.Scene([swarm.Sphere(Decimal("0.5"))], gravity=(0, 0, Fraction(-1, 2)))
     assert exact == swarm.Scene([swarm.Sphere(0.5)], gravity=(0, 0, -0.5))

@@ -53,7 +53,7 @@ def assign(frozen: Any, **values: Any) -> None:
 def of_class(name: str, value: Any, cls: type[Any]) -> None:
     """Raise a `SceneError` unless `value` is an object of a public class."""
     if not isinstance(value, cls):
-        raise SceneError(f"{name} must be a swarm.{cls.__name__}, got {shown(value)}")
+        raise SceneError(f"{name} must be a swarm.{cls.__name__}, got {shown(value)}{brackets(value)}")
 
 
 def is_masked(value: Any) -> bool:

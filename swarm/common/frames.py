@@ -193,17 +193,18 @@ class FrameTimes(Validated):
         frames = self.count - first
         if target is None:
             size = least = frames * (_OBJECTS + _SURFACE * surfaces + more)
-            room, where = checks.memory(), "this machine's memory"
+            room, where, mend = checks.memory(), "this machine's memory", "make every longer"
         else:
             least = frames * (_NUMBERS + _SURFACE * surfaces + more)
             size = least + frames * numbers
             least = least if packed else size
             there = target.stat().st_size if target.exists() else 0
             room, where = shutil.disk_usage(target.parent).free + there, f"what is free in {target.parent.resolve()}"
+            mend = "make every longer, or make room there"
         needed = f"{frames} frames, {'at most ' * packed}{checks.in_bytes(size)}"
         if least > room:
             raise SceneError(
                 f"every must leave frames that fit, got {self.every:g} s until {self.until:g} s: {needed}, and {where} "
-                f"is {checks.in_bytes(room)}; make every longer"
+                f"is {checks.in_bytes(room)}; {mend}"
             )
         _LOG.info("the run has %s", needed)

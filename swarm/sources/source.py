@@ -219,8 +219,7 @@ def checked_sources(name: str, value: Any) -> tuple[Source, ...]:
         return ()
     given = (value,) if isinstance(value, Source) else checks.list_of(name, value, "swarm.Source")
     for k, one in enumerate(given):
-        if not isinstance(one, Source):
-            raise SceneError(f"{name}[{k}] must be a swarm.Source, got {one!r:.200}")
+        checks.of_class(f"{name}[{k}]", one, Source)
     return given
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..common.checks import shown
+from ..common.checks import brackets, shown
 from ..errors import SceneError
 from ..kernel.random import Stream
 from ..kernel.record import Record
@@ -121,7 +121,9 @@ def checked_laws(name: str, given: Any) -> tuple[Any, ...]:
 
 def _checked(name: str, law: Any) -> Any:
     if not isinstance(law, WallLaw):
-        raise SceneError(f"{name} must be a WallLaw, a record derived from swarm.WallLaw, got {shown(law)}")
+        raise SceneError(
+            f"{name} must be a WallLaw, a record derived from swarm.WallLaw, got {shown(law)}{brackets(law)}"
+        )
     if type(law).leave is WallLaw.leave:
         raise SceneError(f"{name} must have a method leave(self, v, n, u, random, mass), {type(law).__name__} has none")
     if law.book not in BOOKS:

@@ -200,7 +200,7 @@ def test_runs_that_support_no_sources():
     for given in (3, "all", [source, 3]):
         with pytest.raises(swarm.SceneError, match="sources"):
             run(SPHERE, given)
-    with pytest.raises(swarm.SceneError, match=r"particles must be a swarm.Particles, got NoneType"):
+    with pytest.raises(swarm.SceneError, match=r"particles must be a swarm.Particles, got None"):
         run(SPHERE, None)
     start = swarm.fill(SPHERE, 3, speed=1.0)
     with pytest.raises(swarm.SceneError, match=r"sources must be left out with .*; use Impact\(\) with"):

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ...common import checks
 from ...compiled_scene import CompiledScene
 from ...contact.laws import NONE
 from ...errors import SceneError
@@ -48,7 +49,8 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
     for name, value, allowed in kinds:
         if not isinstance(value, allowed) and not (name == "particles" and value is None and options.sources):
             instead = "; None goes with sources=[...]" if value is None and name == "particles" else ""
-            raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {type(value).__name__}{instead}")
+            got = f"{checks.shown(value)}{instead or checks.brackets(value)}"
+            raise SceneError(f"{name} must be a swarm.{allowed[0].__name__}, got {got}")
     require_supported(Asked(scene, particles, method, options))
     if isinstance(particles, TiedParticles):
         _require_motions(scene, options.times.until)
