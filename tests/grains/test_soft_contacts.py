@@ -198,6 +198,16 @@ def test_soft_contacts_are_reported_before_the_run(caplog):
     assert warnings_of(caplog, swarm.Scene([ROOM]), thrown(5.0), swarm.Penalty(1e-5, 6.3e4)) == []
 
 
+def test_a_mass_that_was_left_out_is_named(caplog):
+    """Without a mass each ball has 1 kg: for a radius of a millimetre no penalty is the right mend."""
+    start = swarm.Particles(np.zeros((3, 1)), [[5.0], [0.0], [0.0]], radius=1e-3)
+    (wall,) = warnings_of(caplog, swarm.Scene([ROOM]), start, SOFT)
+    assert wall.endswith(
+        "; the mass of particle 0, 1 kg, is 2.4e+08 kg/m^3, above that of every metal: give the particles a mass"
+    )
+    assert "metal" not in warnings_of(caplog, swarm.Scene([ROOM]), thrown(5.0), SOFT)[0]
+
+
 def test_what_a_fall_and_a_wall_that_moves_add_is_known(caplog):
     floor = swarm.Plane((0.0, 0.0, -1.0), 50.0)
     rest = swarm.Particles([[0.0], [0.0], [1.25 - 49.0]], [[0.0]] * 3, MASS, radius=RADIUS)

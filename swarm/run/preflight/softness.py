@@ -17,6 +17,8 @@ from ...surfaces.surface import Surface, shown
 from ..options import Task
 
 _LOG = logging.getLogger("swarm")
+# The density of osmium, the densest metal [kg/m^3].
+_DENSEST = 22_590.0
 
 
 def warn_of_depths(task: Task) -> None:
@@ -116,7 +118,8 @@ def _warn_of_walls(scene: Scene, particles: Particles, radius: Floats, method: M
     speeds = _speeds(scene, particles)
     depths = depths_of(method, particles.mass, speeds, max(surface.restitution for surface in scene.surfaces))
     k = int(np.nanargmax(depths / radius))
-    _warn(method, f"particle {k}, which may reach {speeds[k]:.3g} m/s,", "a wall", float(depths[k]), float(radius[k]))
+    subject = f"particle {k}, which may reach {speeds[k]:.3g} m/s,"
+    _warn(method, subject, "a wall", float(depths[k]), float(radius[k]), _too_dense(scene, particles, radius, k))
 
 
 def _warn_of_pairs(scene: Scene, particles: Particles, radius: Floats, method: Method) -> None:
@@ -128,16 +131,27 @@ def _warn_of_pairs(scene: Scene, particles: Particles, radius: Floats, method: M
     least = np.minimum(radius, radius[fastest])
     k = int(np.nanargmax(depths / least))
     subject = f"particle {k}, at {speeds[k]:.3g} m/s against particle {fastest},"
-    _warn(method, subject, "it", float(depths[k]), float(least[k]))
+    _warn(method, subject, "it", float(depths[k]), float(least[k]), _too_dense(scene, particles, radius, k))
 
 
-def _warn(method: Method, subject: str, what: str, depth: float, radius: float) -> None:
+def _too_dense(scene: Scene, particles: Particles, radius: Floats, k: int) -> str:
+    """What to add where the mass of a ball is likely to be the one that it has by default; else ""."""
+    density = float(particles.mass[k]) / (4.0 / 3.0 * math.pi * float(radius[k]) ** 3)
+    if scene.across() is not None or density <= _DENSEST:
+        return ""
+    return (
+        f"; the mass of particle {k}, {particles.mass[k]:g} kg, is {density:.2g} kg/m^3, above that of every metal: "
+        "give the particles a mass"
+    )
+
+
+def _warn(method: Method, subject: str, what: str, depth: float, radius: float, dense: str) -> None:
     if depth > MOST_PRESSED * radius:
         _LOG.warning(
             "contacts are soft for the speed: %s may sink %.2g m into %s, %.2g of its radius; %g is small, and at "
-            "1 the run ends; use a penalty of %.1e or more (%g here) with a dt that fits it, or Impact",
+            "1 the run ends; use a penalty of %.1e or more (%g here) with a dt that fits it, or Impact%s",
             subject, depth, what, depth / radius, MOST_PRESSED, _penalty(method, depth, MOST_PRESSED * radius),
-            method.penalty,  # type: ignore[attr-defined]
+            method.penalty, dense,  # type: ignore[attr-defined]
         )  # fmt: skip
 
 
