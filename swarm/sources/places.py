@@ -27,6 +27,8 @@ _LOG = logging.getLogger("swarm")
 _BATCH, _FEW, _MOST_BATCHES = 1 << 14, 1 << 11, 250
 # The progress of the search is logged after so many batches, and after every doubling of their number.
 _FIRST_REPORT = 32
+# Of more of the points tried a source needs no advice: a million births at them take seconds.
+_RARE = 0.01
 # Steps of a point onto its surface.
 _STEPS = 3
 # Of the extent, a way out of a wall on which no other part of a union is in that place.
@@ -180,7 +182,7 @@ class PointBatches:
             count, tried = count + found[-1].shape[1], tried + self._batch
             if tried >= _MOST_BATCHES * self._batch and count < 1e-6 * tried:
                 raise SceneError(self._sentence(count, tried))
-            if tried >= next_report and count < n:
+            if tried >= next_report and count < min(n, _RARE * tried):
                 next_report = 2 * tried
                 _LOG.warning(
                     "%s: still looking for places of births, %d of %d found after %d points tried on its wall or in "

@@ -180,6 +180,15 @@ def test_bounds_refuse_no_source_that_has_a_place():
         assert len(made) == 5
 
 
+def test_a_source_at_the_end_of_a_tube_is_not_reported_as_rare(caplog, monkeypatch):
+    """One point of sixteen on the wall of the tube is at its end: that needs no other source, however many are born."""
+    monkeypatch.setattr(places, "_FIRST_REPORT", 1)
+    end = swarm.Box((1e-6, 2.0, 2.0), (-5.0, 0.0, 0.0))
+    tube = swarm.Scene([swarm.Cylinder(1.0, (1.0, 0.0, 0.0), 10.0, openings=[end])])
+    with_births(tube, None, (swarm.Source(end, count=2_000, stop=1.0, speed=1.0),), 1, 1.0)
+    assert not [message for message in caplog.messages if "still looking" in message]
+
+
 def test_a_long_search_for_places_is_reported(caplog, monkeypatch):
     """Whenever it has taken twice as many points."""
     monkeypatch.setattr(places, "_MOST_BATCHES", 100)
