@@ -138,6 +138,13 @@ def test_an_open_volume_is_refused(surface):
         swarm.fill(swarm.Scene([surface]), 10, speed=1.0)
 
 
+def test_a_formula_of_the_other_sign_is_named():
+    with pytest.raises(swarm.SceneError, match=r"is a cavity as \"-\(0\.2 - x\*\*2 - y\*\*2 - z\*\*2\)\" with side"):
+        swarm.fill(swarm.Scene([swarm.Formula("0.2 - x**2 - y**2 - z**2")]), 10, speed=1.0)
+    with pytest.raises(swarm.SceneError, match=r"arrays or a CSV file$"):
+        swarm.fill(swarm.Scene([swarm.Formula("x**2 + y**2 - 0.2")]), 10, speed=1.0)
+
+
 def test_a_volume_too_thin_to_find_is_refused(monkeypatch):
     monkeypatch.setattr(importlib.import_module("swarm.placing.filling"), "_TRIES", 1_000_000)
     scene = swarm.Scene([swarm.Sphere(1.0), swarm.Sphere(1.0 - 1e-8, side="outside")])

@@ -1,5 +1,6 @@
 """Random particles, uniform in the admissible volume of a scene."""
 
+import contextlib
 import functools
 import itertools
 import math
@@ -14,6 +15,7 @@ from ..errors import SceneError
 from ..particles import Particles, VolumeEstimate
 from ..scene import Scene
 from ..state import Floats
+from ..surfaces import Formula
 from .fitting_shapes import require_shapes
 from .sequential import VolumeBox, is_sparse, place_balls, require_packing, require_size
 
@@ -234,9 +236,24 @@ def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]
     if not np.isfinite(high - low).all():
         raise SceneError(
             f"{user} needs a bounded volume, got a scene that is open to infinity; add a surface that closes it, or "
-            f"give {instead}"
+            f"give {instead}{_other_sign(scene)}"
         )
     return low, high
+
+
+def _other_sign(scene: Scene) -> str:
+    """What to add where a formula has the sign that a cavity does not have; else ""."""
+    for i, one in enumerate(scene.surfaces):
+        if isinstance(one, Formula):
+            given = f"-({one.formula})"
+            with contextlib.suppress(SceneError):  # where the bounds of that one are not found, there is no advice
+                negated = Formula(given, parameters=one.parameters, center=one.center, rotation=one.rotation)
+                if np.isfinite(negated.bounds()).all():
+                    return (
+                        f'; surfaces[{i}] (Formula) is a cavity as "{given:.100}" with side = "inside": particles are '
+                        "where phi is below 0"
+                    )
+    return ""
 
 
 def _few_points(
