@@ -1,5 +1,6 @@
 """Errors of files that are read, missing, of another kind or damaged."""
 
+import errno
 import os
 import re
 import stat
@@ -11,6 +12,9 @@ from ..errors import SceneError
 # LookupErrors; SceneError, UnicodeDecodeError and TOMLDecodeError are ValueErrors; RecursionError is a
 # RuntimeError.
 DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, ArithmeticError, MemoryError)
+
+# What the system says of a full disk, and of a user's part of it.
+_FULL = {os.strerror(number) for number in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))}
 
 
 class DamagedError(SceneError):
@@ -37,7 +41,8 @@ def cause(error: BaseException) -> str:
     """The message of the system about a file that cannot be written, without names of parts and texts of HDF5."""
     messages = re.findall(r"error message = '([^']*)'", str(error))
     number = getattr(error, "errno", None)
-    return os.strerror(number) if number else messages[-1] if messages else reason(error)
+    said = os.strerror(number) if number else messages[-1] if messages else reason(error)
+    return f"{said}; make room there" if said in _FULL else said
 
 
 def reason(error: BaseException | None) -> str:
