@@ -291,11 +291,17 @@ def test_without_a_checkpoint_nothing_begins_again_unasked(tmp_path):
     numbers = []
     run(path, resume=True, overwrite=True, progress=lambda frame: numbers.append(frame.number))
     assert numbers == [0, 1, 2, 3, 4]
-    with pytest.raises(swarm.CompleteError, match="is complete: its last frame is at 2 s"):
-        run(path, resume=True)
+    whole = path.read_bytes()
+    for overwrite in (False, True):  # a job of a chain that comes again does not do again what is done
+        with pytest.raises(swarm.CompleteError, match="is complete: its last frame is at 2 s"):
+            run(path, resume=True, overwrite=overwrite)
+    assert path.read_bytes() == whole
     with pytest.raises(swarm.SceneError, match="is of another run") as caught:
         run(path, resume=True, seed=2)
     assert not isinstance(caught.value, swarm.CompleteError)
+    run(path, resume=True, overwrite=True, seed=2)
+    path.write_bytes(whole[:1000])
+    run(path, resume=True, overwrite=True)
 
 
 def test_a_trajectory_of_a_version_that_stored_no_start_is_not_taken_for_complete(tmp_path):

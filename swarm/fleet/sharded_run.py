@@ -55,10 +55,10 @@ class Sharded(Session):
         self._times = np.array([task.options.times.until, task.options.times.every])
         if self._resumes and self._path.exists():
             self._find_shards()
+        elif self._resumes and self._trajectory.exists():
+            self._refuse_to_restart(task.options.until, task.options.overwrite)
         elif task.options.overwrite:
             return
-        elif self._resumes and self._trajectory.exists():
-            self._refuse_to_restart(task.options.until)
         elif (folder := paths.shards_of(self._trajectory)).exists():
             raise SceneError(
                 f"{folder} holds the shards of another run; resume that with --resume, choose another name for the "

@@ -88,8 +88,8 @@ class Session:
         overwrite, until = task.options.overwrite, task.options.until
         if self._path.exists():
             self._resume(until)
-        elif self._trajectory.exists() and not overwrite:
-            self._refuse_to_restart(until)
+        elif self._trajectory.exists():
+            self._refuse_to_restart(until, overwrite)
         if log is not None:
             self._find_log(task, overwrite)
 
@@ -146,8 +146,20 @@ class Session:
             before.require_holds(self._job.frame + 1, self._job.rows, self._job.sums, self._path)
             before.require_intact()
 
-    def _refuse_to_restart(self, until: float) -> None:
-        """Raise the error for a trajectory without a checkpoint: complete, of another run, or in the way."""
+    def _refuse_to_restart(self, until: float, overwrite: bool) -> None:
+        """Raise the error for a trajectory without a checkpoint: complete, of another run, or in the way.
+
+        With `overwrite` only one that is complete is an error: a job that comes again has nothing to do.
+        """
+        try:
+            self._refuse(until)
+        except CompleteError:
+            raise
+        except SceneError:
+            if not overwrite:
+                raise
+
+    def _refuse(self, until: float) -> None:
         from ..files.trajectory import load
 
         trajectory = self._trajectory
