@@ -61,7 +61,7 @@ def test_kelvins_in_place_of_joules(caplog):
     (hint,) = hints_of(room, particles=given, until=1e-6, caplog=caplog)
     assert hint.startswith("a particle has ")
     assert "k_B T in J, at 300 K 4.14e-21 J" in hint
-    with pytest.raises(swarm.SceneError, match=r"above the speed of light, .* at 300 K 4\.14e-21 J"):
+    with pytest.raises(swarm.SceneError, match=r"above the speed of light: .* at 300 K 4\.14e-21 J"):
         hints_of(room, particles=given, caplog=caplog)
     warm = swarm.Scene([swarm.Sphere(0.5, temperature=300.0)])
     (hint,) = hints_of(warm, particles=swarm.fill(warm, 5, speed=400.0, mass=molecule), until=1e-3, caplog=caplog)

@@ -41,8 +41,8 @@ def cause(error: BaseException) -> str:
     """The message of the system about a file that cannot be written, without names of parts and texts of HDF5."""
     messages = re.findall(r"error message = '([^']*)'", str(error))
     number = getattr(error, "errno", None)
-    said = os.strerror(number) if number else messages[-1] if messages else reason(error)
-    return f"{said}; make room there" if said in _FULL else said
+    message = os.strerror(number) if number else messages[-1] if messages else reason(error)
+    return f"{message}; make room there" if message in _FULL else message
 
 
 def reason(error: BaseException | None) -> str:

@@ -265,9 +265,11 @@ def test_a_run_that_was_cut_says_so(tmp_path, words):
     page = Read(swarm.report(tmp_path / "run.h5").html).texts[""]
     assert "This run is not complete: it was stopped at" in page
     assert "of 1 s" in page
-    said = "This run is not complete: it was stopped at 0.5 s of 1 s. There is no checkpoint beside it to go on from."
+    sentence = (
+        "This run is not complete: it was stopped at 0.5 s of 1 s. There is no checkpoint beside it to go on from."
+    )
     rows = summary.of_file(tmp_path / "run.h5")
-    assert (next(iter(rows)), rows["state"]) == ("state", said)
+    assert (next(iter(rows)), rows["state"]) == ("state", sentence)
     run(tmp_path / "whole.h5")
     assert "state" not in summary.of_file(tmp_path / "whole.h5")
 

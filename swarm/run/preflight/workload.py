@@ -75,8 +75,8 @@ def beyond_light(speed: float) -> str:
     if speed <= _LIGHT:
         return ""
     return (
-        ", which is above the speed of light, and swarm knows no relativity: speeds are in m/s, masses in kg, and a "
-        f"temperature is k_B T in J, at 300 K {_ROOM:.3g} J"
+        ", which is above the speed of light: speeds are in m/s, masses in kg, and a temperature is k_B T in J, at "
+        f"300 K {_ROOM:.3g} J"
     )
 
 
