@@ -15,7 +15,6 @@ from ..errors import SceneError
 from ..particles import Particles, VolumeEstimate
 from ..scene import Scene
 from ..state import Floats
-from ..surfaces import Formula
 from .fitting_shapes import require_shapes
 from .sequential import VolumeBox, is_sparse, place_balls, require_packing, require_size
 
@@ -243,6 +242,8 @@ def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]
 
 def _other_sign(scene: Scene) -> str:
     """What to add where a formula has the sign that a cavity does not have; else ""."""
+    from ..surfaces import Formula  # a wing, which few scenes load
+
     for i, one in enumerate(scene.surfaces):
         if isinstance(one, Formula):
             given = f"-({one.formula})"
