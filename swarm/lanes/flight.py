@@ -251,17 +251,22 @@ def _go_by_steps(walls, gravity, lanes, live):
     for i in range(index(live)):
         lane = lanes.lane(i)
         flights.begin(walls.at(lane.remaining), gravity, course, 0, i, lane.r, lane.v, aims=True)
+    some = live
     if walls.aim(gravity):
         tries, some = _aim(walls, gravity, lanes, live)
         if gravity is not None:
             _go_on_beside(walls, gravity, lanes, some, tries)
             return
         _try_on(walls, gravity, lanes, some, tries)
-    for _step in range(_together(gravity, walls)):
+    # Of lanes that do not step together those are marked that have no hit by a guess.
+    together = _together(gravity, walls)
+    for _step in range(together):
         for i in range(index(live)):
             _step_on(walls, gravity, lanes, i)
+    if together > 0:
+        some = _mark(walls, gravity, lanes, live)
     # The few that need more, one by one: a flight in two parts would look like a short one.
-    for k in range(_mark(walls, gravity, lanes, live)):
+    for k in range(some):
         _go_on(walls, gravity, lanes, lanes.order[k])
 
 
@@ -303,6 +308,8 @@ def _try_on(walls, gravity, lanes, some, tries):
         lane = index(lanes.order[k])
         flights.leave_free(walls, gravity, course, 0, lane, lanes.lane(lane).remaining)
         for left in range(tries, -1, -1):
+            if not _needs_more(walls, gravity, lanes, lane):
+                break
             flights.nearer(walls, gravity, course, 0, lane)
             flights.aimed(walls, gravity, course, 0, lane, left == 0)
 

@@ -228,7 +228,8 @@ class ConvexFlight(PolynomialFlight):
 
     def turn(self):
         _c, _b, a2, a3 = self._cubic()
-        return -a2 / select(a3 == 0.0, _TINY, 3.0 * a3)
+        # A parabola bends one way only: its root is that of the guess from the start on.
+        return select(a3 == 0.0, 0.0, -a2 / select(a3 == 0.0, 1.0, 3.0 * a3))
 
 
 class PolynomialFall(Guessed):
