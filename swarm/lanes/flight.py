@@ -265,7 +265,10 @@ def _go_by_steps(walls, gravity, lanes, live):
             _step_on(walls, gravity, lanes, i)
     if together > 0:
         some = _mark(walls, gravity, lanes, live)
-    # The few that need more, one by one: a flight in two parts would look like a short one.
+    # The few that need more take it in the same pass: a flight in two parts would look like a short one.
+    if walls.are_looked_at():
+        _go_on_beside(walls, gravity, lanes, some, 0)
+        return
     for k in range(some):
         _go_on(walls, gravity, lanes, lanes.order[k])
 
@@ -316,9 +319,10 @@ def _try_on(walls, gravity, lanes, some, tries):
 
 @outlined
 def _go_on_beside(walls, gravity, lanes, some, tries):
-    """The last tries and the safe steps of so many lanes that fall, those in `lanes.order`, side by side as others.
+    """The last tries and the safe steps of so many lanes, those in `lanes.order`, side by side as others.
 
-    A safe step of one lane takes as long as one of eight: one by one they were half of the time of all falls.
+    A safe step of one lane takes as long as one of eight: one by one they were half of the time of all falls. Straight
+    flights have their tries before.
     """
     course, rows = lanes.course, len(walls.each) * flights.COURSE
     starts, beside = unwritten((Open.COUNT, STRIDE), np.float64), unwritten((rows, STRIDE), np.float64)
@@ -328,6 +332,17 @@ def _go_on_beside(walls, gravity, lanes, some, tries):
         lane = lanes.lane(i)
         copy_lane(course, i, beside, k, rows)
         one.r, one.v, one.remaining = lane.r, lane.v, lane.remaining
+    if gravity is not None and walls.aim(gravity):
+        _try_on_beside(walls, gravity, starts, beside, count, tries)
+        _step_beside(walls, gravity, starts, beside, count, SAFE_STEPS + MORE_STEPS)
+    else:
+        _step_beside(walls, gravity, starts, beside, count, MORE_STEPS)
+    for k in range(index(some)):
+        copy_lane(beside, k, course, index(lanes.order[k]), rows)
+
+
+def _try_on_beside(walls, gravity, starts, beside, count, tries):
+    """The last tries of so many lanes that fall, from their starts, and the first safe steps of the others."""
     for k in range(index(count)):
         flights.leave_free(walls, gravity, beside, 0, k, Open(starts, k).remaining)
     for left in range(tries, -1, -1):
@@ -335,17 +350,14 @@ def _go_on_beside(walls, gravity, lanes, some, tries):
             flights.nearer(walls, gravity, beside, 0, k)
         for k in range(index(count)):
             flights.aimed(walls, gravity, beside, 0, k, left == 0)
-    _step_beside(walls, gravity, starts, beside, count)
-    for k in range(index(some)):
-        copy_lane(beside, k, course, index(lanes.order[k]), rows)
-
-
-def _step_beside(walls, gravity, starts, beside, count):
-    """The safe steps of so many lanes that fall, from their starts, until the last has no need of more."""
     for k in range(index(count)):
         one = Open(starts, k)
         flights.step_off(walls, gravity, beside, 0, k, one.r, one.v)
-    for _step in range(SAFE_STEPS + MORE_STEPS):
+
+
+def _step_beside(walls, gravity, starts, beside, count, most):
+    """So many safe steps of so many lanes, from their starts, or fewer if the last has no need of more."""
+    for _step in range(most):
         more = 0
         for k in range(index(count)):
             one = Open(starts, k)

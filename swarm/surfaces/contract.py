@@ -261,6 +261,8 @@ class Smooth(AtRest):
     aims = False
     # The number of powers of a `fall` that lanes keep for a guess of its root; 0: falls begin without a guess.
     fall_powers = 0
+    # Whether its steps are those of `FlightByLooks`.
+    looked_at = False
 
     def fall(self, gravity, r, v):
         """The level along a fall as a `PolynomialFall`."""

@@ -76,6 +76,7 @@ _CONSTANTS = (
     "kept",
     "aims",
     "fall_powers",
+    "looked_at",
     "flight",
     "has_levels",
     "has_core",

@@ -112,6 +112,10 @@ class Walls(Record):
         """Whether safe steps to some of these walls along a flight begin with a guess of the root."""
         return any(wall.aims if gravity is None else wall.fall_powers > 0 for wall in self.each)
 
+    def are_looked_at(self):
+        """Whether lanes look at flights to some of these walls."""
+        return any(wall.looked_at for wall in self.each)
+
     # --- Their numbers and rows ---
 
     def numbered(self):

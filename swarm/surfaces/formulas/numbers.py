@@ -5,12 +5,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...kernel.gravity import as_vector
 from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import Symmetric, Vec, dot, largest, square
 from .. import contract
 from ..time_of_impact.course import positive
-from ..time_of_impact.straight import Straight, first_found
+from ..time_of_impact.looks import Straight, falling, first_found
 
 # Points this close, relative to the size, are joined by Gauss's rule, with an error of the 7th power; its outer node.
 _SHORT = 1e-2
@@ -160,9 +161,14 @@ class SmoothCavity(OwnNumbers):
     """A formula of + - * /, roots, sines and cosines: its straight flights go in lanes. A cavity."""
 
     in_steps = True
+    looked_at = True
 
     def steps(self, gravity, r, v):
-        return self.straight(r, v) if gravity is None else None
+        return self.straight(r, v) if gravity is None else falling(self, as_vector(gravity), r, v)
+
+    @outlined
+    def falling_hit(self, r, v, pull):
+        return first_found(falling(self, pull, r, v), self.falling_looks)
 
     def span(self, r, v):
         return 0.0, math.inf
@@ -170,6 +176,12 @@ class SmoothCavity(OwnNumbers):
 
 class SmoothSolid(SmoothCavity):
     """The same of a solid."""
+
+    def steps(self, gravity, r, v):
+        return self.straight(r, v) if gravity is None else None
+
+    def falling_hit(self, r, v, pull):
+        return OwnNumbers.falling_hit(self, r, v, pull)
 
     def span(self, r, v):
         return self._in_box(r, v)

@@ -154,7 +154,7 @@ class Posed(Framed):
         return safe.until_next_cell(self.body, self.sees(None, r, v), self.remaining)
 
     is_quartic, may_be_far, has_levels, leaves_once = False, True, False, False
-    in_steps, kept, aims, fall_powers = False, 0, False, 0
+    in_steps, kept, aims, fall_powers, looked_at = False, 0, False, 0, False
 
     def safe_time(self, r, v, pull):
         return 0.0

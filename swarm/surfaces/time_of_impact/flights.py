@@ -8,8 +8,8 @@ from ...kernel.jit import outlined, select
 from ..presence.rooms import is_of_room, leaving
 from ..walls import Field
 from .course import Fall, Quartic
+from .looks import FlightByLooks, Looked
 from .polynomial import ConvexFlight, PolynomialFall, PolynomialFlight
-from .straight import Looked, Straight
 
 
 class Hit(NamedTuple):
@@ -98,8 +98,8 @@ _OF_POLYNOMIAL = 0, 1, 2, 3, 4, 5, 8
 _GUESS = 8
 # Of a fall that begins with a guess all powers
 _OF_FALL = 0, 1, 2, 3, 4, 9, 10, 11, 12
-# Of a flight that is looked at its bounds and its end, and the next look and the last one
-_OF_STRAIGHT = 4, 5, 8
+# Of a flight that is looked at its constants, and the next look and the last one
+_OF_CONSTANTS = 4, 5, 8
 _OF_LOOKS = 0, 1, 2, 3
 
 
@@ -124,7 +124,7 @@ def begin(walls, gravity, course, row, lane, r, v, aims=False):
             if aims and wall.aims:
                 _begin_guess(course, at, lane, steps)
                 continue
-        elif isinstance(steps, Straight):
+        elif isinstance(steps, FlightByLooks):
             _begin_looks(course, at, lane, steps)
             continue
         course[at + _TIME, lane], course[at + _LAST, lane] = steps.first_step()
@@ -154,17 +154,17 @@ def _begin_guess(course, at, lane, flight):
 
 def _begin_looks(course, at, lane, flight):
     """The start of a flight that is looked at."""
-    for i, number in zip(_OF_STRAIGHT, (flight.least, flight.most, flight.end), strict=True):
+    for i, number in zip(_OF_CONSTANTS, flight.constants(), strict=False):
         course[at + i, lane] = number
     _keep(course, at, lane, flight.first())
 
 
 def _look_on(course, at, lane, flight):
     """One look more at it, if that is needed."""
-    least, most, end = (course[at + i, lane] for i in _OF_STRAIGHT)
+    constants = tuple(course[at + i, lane] for i in _OF_CONSTANTS[: len(flight.constants())])
     goes_on = course[at + _LAST, lane] > 0.0
     known = Looked(course[at + _TIME, lane], goes_on, *(course[at + i, lane] for i in _OF_LOOKS))
-    after = flight._replace(least=least, most=most, end=end).look(known)
+    after = flight.with_constants(*constants).look(known)
     _keep(course, at, lane, Looked(*(select(goes_on, new, old) for new, old in zip(after, known, strict=True))))
 
 
@@ -256,7 +256,7 @@ def step(walls, gravity, course, row, lane, r, v):
             steps = _level(course, at, lane, wall, gravity)
         else:
             steps = wall.steps(gravity, r, v)
-        if isinstance(steps, Straight):
+        if isinstance(steps, FlightByLooks):
             _look_on(course, at, lane, steps)
         elif steps is not None:
             t, last = steps.next_step(course[at + _TIME, lane], course[at + _LAST, lane])
