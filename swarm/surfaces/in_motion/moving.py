@@ -90,6 +90,9 @@ class Carried(Walls):
     def aim(self, gravity):
         return False
 
+    def are_looked_at(self):
+        return False
+
 
 class Marched(Carried):
     """The same where others move in any other way, by safe steps to these, or where some are bodies of a field."""

@@ -131,7 +131,7 @@ class Present(Unturned):
     there: float
 
     # Its safe steps are taken in lanes only where its level is known as a whole.
-    in_steps, has_levels, kept, aims, fall_powers = False, False, 0, False, 0
+    in_steps, has_levels, kept, aims, fall_powers, looked_at = False, False, 0, False, 0, False
 
     def flat_normal(self):
         return self.body.flat_normal()
