@@ -19,8 +19,8 @@ from .table import EIGHT, STRIDE, LaneView, Rows, copy_lane, marked_lanes
 
 # After the first safe step to walls in any motion all lanes take so many more in a pass.
 _STRIDES = 3
-# Guesses are improved in all lanes together if at least one lane in so many needs it.
-_MANY = 8
+# Guesses are improved in all lanes together if at least one lane in so many needs it; flights are looked at so.
+_MANY, _LOOK = 8, 4
 
 
 _named = Rows()
@@ -255,7 +255,7 @@ def _go_by_steps(walls, gravity, lanes, live):
     if walls.aim(gravity):
         tries, some = _aim(walls, gravity, lanes, live)
         if gravity is not None:
-            _go_on_beside(walls, gravity, lanes, some, tries)
+            _go_on_beside(walls, gravity, lanes, some, tries, SAFE_STEPS + MORE_STEPS)
             return
         _try_on(walls, gravity, lanes, some, tries)
     # Of lanes that do not step together those are marked that have no hit by a guess.
@@ -267,10 +267,21 @@ def _go_by_steps(walls, gravity, lanes, live):
         some = _mark(walls, gravity, lanes, live)
     # The few that need more take it in the same pass: a flight in two parts would look like a short one.
     if walls.are_looked_at():
-        _go_on_beside(walls, gravity, lanes, some, 0)
+        some, left = _look_on(walls, gravity, lanes, live, some)
+        _go_on_beside(walls, gravity, lanes, some, 0, left)
         return
     for k in range(some):
         _go_on(walls, gravity, lanes, lanes.order[k])
+
+
+def _look_on(walls, gravity, lanes, live, some):
+    """More looks of all lanes while many need them: (how many lanes need more, the looks that are left to them)."""
+    left = MORE_STEPS
+    while left > 0 and _LOOK * some >= live:
+        for i in range(index(live)):
+            _step_on(walls, gravity, lanes, i)
+        left, some = left - 1, _mark(walls, gravity, lanes, live)
+    return some, left
 
 
 def _together(gravity, walls):
@@ -318,8 +329,8 @@ def _try_on(walls, gravity, lanes, some, tries):
 
 
 @outlined
-def _go_on_beside(walls, gravity, lanes, some, tries):
-    """The last tries and the safe steps of so many lanes, those in `lanes.order`, side by side as others.
+def _go_on_beside(walls, gravity, lanes, some, tries, most):
+    """The last tries and at most so many safe steps of so many lanes, those in `lanes.order`, side by side as others.
 
     A safe step of one lane takes as long as one of eight: one by one they were half of the time of all falls. Straight
     flights have their tries before.
@@ -334,9 +345,7 @@ def _go_on_beside(walls, gravity, lanes, some, tries):
         one.r, one.v, one.remaining = lane.r, lane.v, lane.remaining
     if gravity is not None and walls.aim(gravity):
         _try_on_beside(walls, gravity, starts, beside, count, tries)
-        _step_beside(walls, gravity, starts, beside, count, SAFE_STEPS + MORE_STEPS)
-    else:
-        _step_beside(walls, gravity, starts, beside, count, MORE_STEPS)
+    _step_beside(walls, gravity, starts, beside, count, most)
     for k in range(index(some)):
         copy_lane(beside, k, course, index(lanes.order[k]), rows)
 
