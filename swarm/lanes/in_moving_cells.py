@@ -18,7 +18,7 @@ from ..kernel.record import Record
 from ..kernel.vector import column, dot, norm, put
 from ..surfaces.facets.facet_cells import CurveBound, FlightInCell, flight_in
 from ..surfaces.fields.members import member
-from ..surfaces.time_of_impact.course import rise_time
+from ..surfaces.time_of_impact.course import positive, rise_time
 from ..surfaces.time_of_impact.flights import Hit
 from ..surfaces.time_of_impact.march import lets_go
 from ..surfaces.time_of_impact.rising import InWallFrame, Level, ThirdDerivativeBound, flight_of
@@ -30,8 +30,7 @@ from .table import EIGHT, LANES, STRIDE
 _REMAINING, _FAST = SPEED + 3, SPEED + 4
 _PLACE, _PACE, _PULL, _ARM, _COORDINATES = ROWS, ROWS + 3, ROWS + 6, ROWS + 9, ROWS + 10
 # And its way through its cell, which begins where it is from the middle of that.
-_WAY, _BENT, _SLOW, _WEAK, _JERK, _REACH = ROWS + 11, ROWS + 14, ROWS + 17, ROWS + 18, ROWS + 19, ROWS + 20
-_PIECE = ROWS + 21
+_WAY, _BENT, _NUMBERS, _PIECE = ROWS + 11, ROWS + 14, tuple(range(ROWS + 17, ROWS + 22)), ROWS + 22
 # Safe steps to one facet.
 _STEPS = 100
 # The bounds of a flight hold for at most so many times the time in which the motion changes little: a turn by a radian
@@ -49,7 +48,7 @@ _TO_HIT, _NEARER, _BEYOND, _BEHIND, _PAST, _ALONE = 0.0, -1.0, -2.0, -3.0, -4.0,
 class UnderWayInMotion(UnderWay):
     """Those that go through the cells of a mesh that moves: curves in its frame."""
 
-    width, own = ROWS + 22, 8
+    width, own = ROWS + 23, 8
 
     def begin(self, i, lane, found):
         """As of `UnderWay`."""
@@ -112,23 +111,31 @@ class UnderWayInMotion(UnderWay):
     def may_meet(self, gravity, mesh, i, cone):
         """As of `UnderWay`."""
         seen, span = self.seen(mesh, gravity, i), self.until[i] - self.time[i]
-        return not cone.is_left(seen.v, seen.bounds(span).acceleration * span)
+        # The velocity is around the mean of those at both ends of its way.
+        jerk, half = seen.jerk(span), 0.5 * span
+        change, off = half * seen.a, half * span * jerk.rest
+        if jerk.known is not None:
+            bent = (0.5 * half * span) * jerk.known
+            change, off = change + bent, off + 0.5 * norm(bent)
+        return not cone.is_left(seen.v + change, norm(change) + off)
 
     def keep_way(self, gravity, mesh, i):
         """As of `UnderWay`."""
         rows, seen, span = self.rows, self.seen(mesh, gravity, i), self.until[i] - self.time[i]
         at = column(rows, MIDDLE, i)
-        way = flight_in(mesh.body.grid, at, seen.v, seen.a, span, seen.bounds(span))
+        way = flight_in(mesh.body.grid, at, seen.v, seen.a, span, seen.jerk(span))
         for row, vector in ((MIDDLE, way.at), (_WAY, way.way), (_BENT, way.bent)):
             put(rows, row, i, vector)
-        for row, number in ((_SLOW, way.slow), (_WEAK, way.weak), (_JERK, way.curve.jerk), (_REACH, way.curve.reach)):
+        curve = way.curve
+        for row, number in zip(_NUMBERS, (way.slow, way.weak, curve.off, curve.bends, curve.reach), strict=True):
             rows[row, i] = number
 
     def way(self, _gravity, _mesh, i):
         """As of `UnderWay`."""
         rows = self.rows
         at, way, bent = (column(rows, row, i) for row in (MIDDLE, _WAY, _BENT))
-        return FlightInCell(at, way, bent, rows[_SLOW, i], rows[_WEAK, i], CurveBound(rows[_JERK, i], rows[_REACH, i]))
+        slow, weak, off, bends, reach = (rows[row, i] for row in _NUMBERS)
+        return FlightInCell(at, way, bent, slow, weak, CurveBound(off, bends, reach))
 
     def meet(self, gravity, mesh, maybe, some):
         """As of `UnderWay`."""
@@ -262,14 +269,14 @@ def _approach(facet, seen, t, until):
     longest, room = until - t, 2.0 * EPSILON * seen.coordinates
     ahead = 2.0 * rise_time(depth, rate, bend)
     ahead = select(ahead < longest, ahead, longest)
-    bounds = seen.bounds(ahead)
-    sixth = bounds.jerk * (1.0 / 6.0)
-    time = rise_time(depth, rate, bend + sixth * ahead)
+    jerk, speed = seen.jerk(ahead), seen.bounds(ahead).speed
+    third, rest = (1.0 / 6.0) * jerk.along(facet.normal), (1.0 / 6.0) * jerk.rest
+    time = rise_time(depth, rate, bend + (positive(third) + rest) * ahead)
     time = select(time < ahead, time, ahead)
-    is_sure = 2.0 * sixth * ahead * time * time <= room
-    is_near, is_there = is_sure | (time * bounds.speed <= room), not facet.is_beyond(_place(seen, time), 0.0)
+    is_sure = 2.0 * (abs(third) + rest) * ahead * time * time <= room
+    is_near, is_there = is_sure | (time * speed <= room), not facet.is_beyond(seen.place(time, jerk), 0.0)
     was_there = not facet.is_beyond(seen.r, 0.0)
-    hits = (is_sure & is_there) | (was_there & (time * bounds.speed <= room)) | (not t + time > t)
+    hits = (is_sure & is_there) | (was_there & (time * speed <= room)) | (not t + time > t)
     alone = (depth > facet.room.value) | lets_go(depth, rate, time, room) | (is_near & (not hits))
     leads = select(hits, _TO_HIT, select(time < longest, _NEARER, _PAST))
     return time, select(alone, _ALONE, select(time < longest, leads, _PAST))
@@ -318,18 +325,19 @@ def _place(seen, t):
 def _misses(facet, seen, longest):
     """Whether a flight surely does not meet a facet for so long, nor is behind it: it is beyond an edge if it may.
 
-    The level of its plane is c + 2 b t + a t^2, give or take J t^3/6 <= k t^2: it rises between the times at which both
-    bounds do, unless the lower one comes back.
+    The level of its plane is between c + 2 b t + (a - less) t^2 and c + 2 b t + (a + more) t^2: it rises between the
+    times at which both do, unless the lower one comes back.
     """
     c, b, a = facet.phi(seen.r), 0.5 * dot(facet.normal, seen.v), 0.5 * dot(facet.normal, seen.a)
-    bounds, room = seen.bounds(longest), facet.room.value
-    k = bounds.jerk * longest * (1.0 / 6.0)
-    begin, end = rise_time(c, b, a + k), rise_time(c - room, b, a - k)
-    stays = (a >= k) | (c - room + longest * (2.0 * b + longest * (a - k)) > 0.0)
+    jerk, room, sixth = seen.jerk(longest), facet.room.value, longest * (1.0 / 6.0)
+    along, off = jerk.along(facet.normal), sixth * jerk.rest
+    more, less = sixth * positive(along) + off, sixth * positive(-along) + off
+    begin, end = rise_time(c, b, a + more), rise_time(c - room, b, a - less)
+    stays = (a >= less) | (c - room + longest * (2.0 * b + longest * (a - less)) > 0.0)
     is_near = begin < longest
     begin, end = select(is_near, begin, 0.0), select(stays & (end < longest), end, longest)
-    beside = 0.5 * bounds.speed * (end - begin) + k * end * end + room
-    return (c <= room) & ((not is_near) | facet.is_beyond(_place(seen, 0.5 * (begin + end)), beside))
+    beside = 0.5 * seen.bounds(longest).speed * (end - begin) + off * end * end + room
+    return (c <= room) & ((not is_near) | facet.is_beyond(seen.place(0.5 * (begin + end), jerk), beside))
 
 
 @outlined

@@ -40,6 +40,8 @@ _BASE, _ZERO, _LONGEST = 32.0, 16.0, 26.0
 # The first of these parts in the unit of the balls, and times the length of whole normals.
 _NEAR_PLACE = _OFF * _FULL / _REACH
 _NEAR = _NEAR_PLACE * _FULL
+# The largest s (s - 1/2) (s - 1) on the way from 0 to 1, sqrt(3)/36
+_CUBIC = 0.0482
 # How far beside the true place a flight may seem to come through a plane, by a distance and a speed that may be none.
 _BESIDE = 4.0 / _OFF_SPEED
 # A flight to a mesh that turns or swings is known to be in a cell until shortly before its end: it ends so much
@@ -214,8 +216,9 @@ class FlightInCell(Record):
 class CurveBound(Record):
     """What bounds a flight that is no parabola, in the same units."""
 
-    jerk: float  # how far it may be from the parabola at its end
-    reach: float  # how far from the middle of the line
+    off: float  # how far it may be from the parabola
+    bends: float  # how much its velocity, and half of its acceleration, may differ
+    reach: float  # how far it may be from the middle between its ends
 
 
 def from_middle(cells, place, r):
@@ -224,7 +227,7 @@ def from_middle(cells, place, r):
     return r - (cells.low + Vec((place.x + 0.5) * w.x, (place.y + 0.5) * w.y, (place.z + 0.5) * w.z))
 
 
-def flight_in(cells, at, v, pull, span, bounds=None):
+def flight_in(cells, at, v, pull, span, jerk=None):
     """The `FlightInCell` of a flight that is in a cell for so long, from this place on from its middle.
 
     Args:
@@ -233,16 +236,25 @@ def flight_in(cells, at, v, pull, span, bounds=None):
         v: the velocity there [m/s].
         pull: the acceleration there [m/s^2], or None.
         span: how long [s].
-        bounds: its `Bounds` for so long, where the acceleration changes.
+        jerk: its `Jerk` for so long, where the acceleration changes.
     """
     unit = (_FULL / _REACH) / math.sqrt(square(cells.width))
     way, bent, weak, curve = (unit * span) * v, None, 0.0, None
     if pull is not None:
         bent = (0.5 * unit * span * span) * as_vector(pull)
+    if jerk is not None:
+        sixth = unit * span * span * span * (1.0 / 6.0)
+        off = sixth * jerk.rest
+        bends = 3.0 * off
+        if jerk.known is not None:
+            # s^3 = (3 s^2 - s)/2 + s (s - 1/2) (s - 1), of which the last is little, and so are its derivatives.
+            cubic = sixth * jerk.known
+            size, way, bent = norm(cubic), way - 0.5 * cubic, bent + 1.5 * cubic
+            off, bends = off + _CUBIC * size, bends + 1.5 * size
+        # The middle of a parabola is a quarter of its bend from that between its ends.
+        curve = CurveBound(off, bends, 0.5 * norm(way + bent) + 0.25 * norm(bent) + off)
+    if bent is not None:
         weak = _FULL * _OFF_SPEED * total(absolute(bent))
-    if bounds is not None:
-        half = 0.5 * unit * span * span
-        curve = CurveBound(half * bounds.jerk * span * (1.0 / 3.0), half * bounds.acceleration + 0.5 * norm(way))
     return FlightInCell(unit * at, way, bent, _FULL * _OFF_SPEED * total(absolute(way)) + 2.0 * weak, weak, curve)
 
 
@@ -283,15 +295,15 @@ def _is_beside(away, half, reach, off, unit):
 
 def _passes_in_curve(here, at, level, half, radius):
     """As `passes` of a parabola, or of what is near to one: its level is depth + rate s + bend s^2 at the part s."""
-    (depth, rate, bend), jerk, farther = level, 0.0, 0.0
+    (depth, rate, bend), off, bends, farther = level, 0.0, 0.0, 0.0
     if here.curve is not None:
-        jerk, farther = _FULL * here.curve.jerk, here.curve.jerk
+        off, bends, farther = _FULL * here.curve.off, _FULL * here.curve.bends, here.curve.off
     rises, falls = select(bend > 0.0, bend, 0.0), select(bend < 0.0, -bend, 0.0)
     # The level is that give or take `more`.
-    more, most, least = here.slow + jerk + _NEAR, rate + rises, rate - falls
-    grows, reaches = most + rises + here.slow + 3.0 * jerk > 0.0, depth + select(most > 0.0, most, 0.0) >= -more
+    more, most, least = here.slow + off + _NEAR, rate + rises, rate - falls
+    grows, reaches = most + rises + here.slow + bends > 0.0, depth + select(most > 0.0, most, 0.0) >= -more
     # What is behind the plane comes back first.
-    comes_back = (bend > -(here.weak + 3.0 * jerk)) & (depth + select(least < 0.0, least, 0.0) <= more)
+    comes_back = (bend > -(here.weak + bends)) & (depth + select(least < 0.0, least, 0.0) <= more)
     meets = grows & reaches & ((depth <= _NEAR) | comes_back)
     # Where it comes through the plane its level rises by 2 root. It is near to 0 for so short a time only, unless it
     # comes back.
@@ -304,12 +316,12 @@ def _passes_in_curve(here, at, level, half, radius):
     away = root * (at + part * (here.way + part * here.bent))
     # Times the root, so that little is divided.
     length = (here.slow + 2.0 * here.weak) * (1.0 / (_FULL * _OFF_SPEED))
-    off = (farther + _NEAR_PLACE) * root + length * more
-    meets = meets & (not (is_known & _is_beside(away, half, radius * root, off, root)))
+    error = (farther + _NEAR_PLACE) * root + length * more
+    meets = meets & (not (is_known & _is_beside(away, half, radius * root, error, root)))
     if here.curve is None:
         return meets
-    # Around its middle it is in a ball.
-    middle, reach = at + 0.5 * here.way, radius + here.curve.reach + _NEAR_PLACE
+    # Around the middle between its ends it is in a ball.
+    middle, reach = at + 0.5 * (here.way + here.bent), radius + here.curve.reach + _NEAR_PLACE
     return meets & (square(middle) <= reach * reach)
 
 

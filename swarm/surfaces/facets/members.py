@@ -75,7 +75,7 @@ class Facets(Members, Patched):
 
     def way_in_cell(self, cell, seen, span):
         at = from_middle(self.grid, cell.place, seen.r)
-        return flight_in(self.grid, at, seen.v, seen.a, span, seen.bounds(span))
+        return flight_in(self.grid, at, seen.v, seen.a, span, seen.jerk(span))
 
     def may_meet(self, cell, k, here):
         return _passes(self.grid, cell.number, k, here)

@@ -16,8 +16,8 @@ from ...kernel.gravity import accelerated, as_vector, displacement
 from ...kernel.grid import MostPull
 from ...kernel.jit import select
 from ...kernel.record import Record
-from ...kernel.vector import ZERO, Vec, absolute, dot, norm, times, total
-from .course import Majorant, rise_time
+from ...kernel.vector import ZERO, Vec, absolute, cross, dot, norm, times, total
+from .course import Majorant, positive, rise_time
 
 # The bounds of a step hold for at most so many times its length, after so many trials.
 _CLOSE, _TRIALS = 2.0, 8
@@ -62,6 +62,17 @@ class Flight(Record):
         )  # fmt: skip
 
 
+class Jerk(Record):
+    """The third derivative of a place in the frame of a wall for some time."""
+
+    known: Any  # what is known of it, or None
+    rest: float  # a bound of what it may be beside that
+
+    def along(self, normal):
+        """What is known of it along a normal."""
+        return 0.0 if self.known is None else dot(normal, self.known)
+
+
 class InWallFrame(Record):
     """A particle in the frame of a wall at one time of its flight, and what bounds its way from there."""
 
@@ -96,12 +107,35 @@ class InWallFrame(Record):
             drive.jerk + spin * (3.0 * hard + spin * (3.0 * speed + spin * arm)),
         )
 
+    def jerk(self, within):
+        """Its `Jerk` for so long [s]."""
+        drive, turn = self.drive, self.drive.turn
+        if turn is None:
+            return Jerk(None, drive.jerk)
+        # Of x = r - c - d with the derivatives x1, x2, x3 it is A^T (x3 - 3 w x x2 + 3 w x (w x x1) + w^2 w x x).
+        # All but the first is known now, and changes as A^T turns by the rate once more.
+        spin, spins = abs(turn.rate), turn.rate * turn.axis
+        known = cross(spins, spin * spin * (self.r - drive.center) - 3.0 * (self.a + cross(spins, self.v)))
+        speed = self.fastest(within)
+        fourth = 6.0 * self.hardest() + spin * (4.0 * speed + spin * (self.arm + speed * within))
+        return Jerk(known, drive.jerk + within * spin * (3.0 * drive.jerk + spin * fourth))
+
+    def place(self, t, jerk):
+        """Its place after a time, but for the rest of its `Jerk`."""
+        a = self.a if jerk.known is None else self.a + (t * (1.0 / 3.0)) * jerk.known
+        return self.r + t * (self.v + (0.5 * t) * a)
+
     def pulls(self, within):
         """The `MostPull` along each axis that bounds its places for so long [s]."""
-        bounds = self.bounds(within)
+        most, jerk = self.bounds(within).acceleration, self.jerk(within)
+        x, y, z = (0.0, 0.0, 0.0) if jerk.known is None else jerk.known
+        ahead = Vec(*(jerk.rest + positive(along) for along in (x, y, z)))
+        back = Vec(*(jerk.rest + positive(-along) for along in (x, y, z)))
         # x <= v t + a t^2/2 + J t^3/6
-        more, most = bounds.jerk * within * (1.0 / 3.0), bounds.acceleration
-        return tuple(MostPull(min(a + more, most), min(more - a, most)) for a in self.a)
+        return tuple(
+            MostPull(min(a + up * within * (1.0 / 3.0), most), min(down * within * (1.0 / 3.0) - a, most))
+            for a, up, down in zip(self.a, ahead, back, strict=True)
+        )
 
 
 def flight_of(r, v, gravity, remaining, speed=None):
