@@ -62,6 +62,33 @@ def rise_time_by(c, b, a, discriminant):
     return select(misses, math.inf, select(time > 0.0, time, 0.0))
 
 
+class Quotient(Record):
+    """A time as a quotient, infinite where the divisor is 0: of several the soonest is found by products alone."""
+
+    over: float
+    under: float
+
+    def sooner(self, other):
+        """The sooner of two."""
+        return Quotient(*select(other.over * self.under < self.over * other.under, tuple(other), tuple(self)))
+
+    def time(self):
+        """Its value."""
+        is_finite = self.under > 0.0
+        return select(is_finite, self.over / select(is_finite, self.under, 1.0), math.inf)
+
+
+NEVER = Quotient(1.0, 0.0)
+
+
+def rise_quotient(c, b, a):
+    """`rise_time` as a `Quotient`."""
+    discriminant = b * b - a * c
+    over, under = _outer_quotient(c, b, a, discriminant)
+    misses = (under <= 0.0) | ((a < 0.0) & (discriminant < 0.0))
+    return Quotient(*select(misses, tuple(NEVER), (select(over > 0.0, over, 0.0), under)))
+
+
 def rise_time_inside(c, b, a):
     """`rise_time` for a >= 0: a convex cavity, which a particle that moves never misses."""
     time, bottom = _outer_root(c, b, a, b * b - a * c)
@@ -70,9 +97,14 @@ def rise_time_inside(c, b, a):
 
 def _outer_root(c, b, a, discriminant):
     """The root at which c + 2 b t + a t^2 rises, and its denominator."""
+    over, under = _outer_quotient(c, b, a, discriminant)
+    return over / under, under
+
+
+def _outer_quotient(c, b, a, discriminant):
+    """That root as a quotient."""
     # a > 0, c > 0 by round-off at a grazing hit: the flight touches, it does not miss.
     root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
     approaching = b > 0.0
     # The form of the root that does not cancel: -c/(b + root) when b > 0, (root - b)/a when b <= 0.
-    bottom = select(approaching, b + root, a)
-    return select(approaching, -c, root - b) / bottom, bottom
+    return select(approaching, -c, root - b), select(approaching, b + root, a)

@@ -4,7 +4,6 @@ The entries of a cell are `entries[first[cell]:first[cell + 1]]`, in the order i
 is known of cells, without the last of these, of which it says how many are `spare`.
 """
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from ..state import Floats
 from .arrays import index
-from .gravity import rise_time
+from .gravity import NEVER, Quotient, rise_quotient, rise_time
 from .jit import Array, select
 from .record import Record
 from .vector import Vec, vec
@@ -163,7 +162,7 @@ def _until_next_layer(layers, place, x, v, pull):
     low, width, margin, count = layers
     if pull is None:
         never = select(v > 0.0, place >= count, place < 0.0)
-        return select(never, np.inf, _until_edge((low, width, margin), place, place, x, v))
+        return select(never, np.inf, _edge_quotient((low, width, margin), place, place, x, v).time())
     among, below = (place >= 0.0) & (place < count), place < 0.0
     sign, face = select(below, 1.0, -1.0), select(below, low + margin, low + count * width - margin)
     b = 0.5 * v
@@ -186,22 +185,21 @@ def until_out(gravity, grid, first, last, r, v):
     layers = zip(grid.low, grid.width, grid.margin, strict=True)
     pulls = 3 * (None,) if gravity is None else gravity
     x, y, z = (_until_out_of_layers(*one) for one in zip(layers, first, last, r, v, pulls, strict=True))
-    sooner = select(y < x, y, x)
-    return select(z < sooner, z, sooner)
+    return x.sooner(y).sooner(z).time()
 
 
 def _until_out_of_layers(layers, first, last, x, v, pull):
-    """When a flight leaves layers of cells, and a margin. Branch-free, and with one root only.
+    """When a flight leaves layers of cells, and a margin, as a `Quotient`. Branch-free, and with one root only.
 
     Where of its acceleration there is only a bound, at the soonest.
     """
     low, width, margin = layers
     if pull is None:
-        return _until_edge(layers, first, last, x, v)
+        return _edge_quotient(layers, first, last, x, v)
     below, above = low + first * width - margin, low + (last + 1.0) * width + margin
     if isinstance(pull, MostPull):
-        up, down = rise_time(x - above, 0.5 * v, 0.5 * pull.up), rise_time(below - x, -0.5 * v, 0.5 * pull.down)
-        return select(down < up, down, up)
+        up = rise_quotient(x - above, 0.5 * v, 0.5 * pull.up)
+        return up.sooner(rise_quotient(below - x, -0.5 * v, 0.5 * pull.down))
     # Towards the side to which it is pulled it leaves, unless it leaves before through the other one.
     turned = pull < 0.0
     a, b = 0.5 * abs(pull), 0.5 * select(turned, -v, v)
@@ -211,14 +209,14 @@ def _until_out_of_layers(layers, first, last, x, v, pull):
     root = np.sqrt(b * b + a * select(backwards, -behind, ahead))
     over = select(backwards, behind, select(b > 0.0, ahead, root - b))
     under = select(backwards, root - b, select(b > 0.0, root + b, a))
-    return select(under > 0.0, over / under, math.inf)
+    return Quotient(*select(under > 0.0, (over, under), tuple(NEVER)))
 
 
-def _until_edge(layers, first, last, x, v):
-    """When a straight flight leaves layers of cells, and a margin."""
+def _edge_quotient(layers, first, last, x, v):
+    """When a straight flight leaves layers of cells, and a margin, as a `Quotient`."""
     (low, width, margin), ahead = layers, v > 0.0
     edge = low + select(ahead, last + 1.0, first) * width + select(ahead, margin, -margin)
-    return select(v == 0.0, math.inf, (edge - x) / v)
+    return Quotient(*select(v == 0.0, tuple(NEVER), (select(ahead, edge - x, x - edge), abs(v))))
 
 
 # --- How it is made --------------------------------------------------------------------------------------

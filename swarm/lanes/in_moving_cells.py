@@ -158,13 +158,13 @@ def _meet(gravity, mesh, under, maybe, first, count):
     marked, near = unwritten(STRIDE, np.bool_), near_facets()
     for n in range(index(count)):
         i, facet = index(maybe.lane[first + n]), member(mesh.body, index(maybe.facet[first + n]))
-        marked[n] = not _misses(facet, under.seen(mesh, gravity, i), under.until[i] - under.time[i])
+        way = facet.way_past(under.seen(mesh, gravity, i), under.until[i] - under.time[i])
+        marked[n], near.step[n] = not way.misses, way.begin
     left = index(0)
     for n in range(index(count)):
-        near.lane[left], near.facet[left] = maybe.lane[first + n], maybe.facet[first + n]
+        i = index(maybe.lane[first + n])
+        near.lane[left], near.facet[left], near.time[left] = i, maybe.facet[first + n], under.time[i] + near.step[n]
         left += index(marked[n])
-    for k in range(left):
-        near.time[k] = under.time[index(near.lane[k])]
     for _round in range(_TOGETHER):
         count = near.in_eights(left)
         near.look_up(mesh, under, count)
@@ -320,24 +320,6 @@ def _leaving(facet, seen, level, longest):
 def _place(seen, t):
     """Where a flight is after a time, but for its jerk."""
     return seen.r + t * (seen.v + (0.5 * t) * seen.a)
-
-
-def _misses(facet, seen, longest):
-    """Whether a flight surely does not meet a facet for so long, nor is behind it: it is beyond an edge if it may.
-
-    The level of its plane is between c + 2 b t + (a - less) t^2 and c + 2 b t + (a + more) t^2: it rises between the
-    times at which both do, unless the lower one comes back.
-    """
-    c, b, a = facet.phi(seen.r), 0.5 * dot(facet.normal, seen.v), 0.5 * dot(facet.normal, seen.a)
-    jerk, room, sixth = seen.jerk(longest), facet.room.value, longest * (1.0 / 6.0)
-    along, off = jerk.along(facet.normal), sixth * jerk.rest
-    more, less = sixth * positive(along) + off, sixth * positive(-along) + off
-    begin, end = rise_time(c, b, a + more), rise_time(c - room, b, a - less)
-    stays = (a >= less) | (c - room + longest * (2.0 * b + longest * (a - less)) > 0.0)
-    is_near = begin < longest
-    begin, end = select(is_near, begin, 0.0), select(stays & (end < longest), end, longest)
-    beside = 0.5 * seen.bounds(longest).speed * (end - begin) + off * end * end + room
-    return (c <= room) & ((not is_near) | facet.is_beyond(seen.place(0.5 * (begin + end), jerk), beside))
 
 
 @outlined

@@ -9,7 +9,7 @@ from ...kernel.jit import Array, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, cross, dot, norm, square
 from ..shapes.plane import Flat, PlaneNumbers
-from ..time_of_impact.course import rise_time
+from ..time_of_impact.course import positive, rise_time
 from ..time_of_impact.rising import patch_step
 
 # The round-off of places, as a part of the farthest coordinate: far above that of numbers, and of a hit.
@@ -74,6 +74,13 @@ class CornersOfSides(CornersOf):
 
     def row(self, m):
         return index(m // 2)
+
+
+class WayPast(Record):
+    """Whether a flight surely does not meet a facet, and until when it surely is before its plane."""
+
+    misses: bool
+    begin: float
 
 
 class FacetNumbers(Flat):
@@ -177,6 +184,24 @@ class FacetNumbers(Flat):
 
     def moving_step(self, seen, longest):
         return _moving_step(self, seen, longest)
+
+    def way_past(self, seen, longest):
+        """The `WayPast` of a flight for so long: one that misses is not behind it, or beyond an edge where it may be.
+
+        The level of its plane is between c + 2 b t + (a - less) t^2 and c + 2 b t + (a + more) t^2: it rises between
+        the times at which both do, unless the lower one comes back.
+        """
+        c, b, a = self.phi(seen.r), 0.5 * dot(self.normal, seen.v), 0.5 * dot(self.normal, seen.a)
+        jerk, room, sixth = seen.jerk(longest), self.room.value, longest * (1.0 / 6.0)
+        along, off = jerk.along(self.normal), sixth * jerk.rest
+        more, less = sixth * positive(along) + off, sixth * positive(-along) + off
+        begin, end = rise_time(c, b, a + more), rise_time(c - room, b, a - less)
+        stays = (a >= less) | (c - room + longest * (2.0 * b + longest * (a - less)) > 0.0)
+        is_near = begin < longest
+        begin, end = select(is_near, begin, 0.0), select(stays & (end < longest), end, longest)
+        beside = 0.5 * seen.bounds(longest).speed * (end - begin) + off * end * end + room
+        misses = (c <= room) & ((not is_near) | self.is_beyond(seen.place(0.5 * (begin + end), jerk), beside))
+        return WayPast(misses, select(c <= room, begin, 0.0))
 
 
 class SheetSide(FacetNumbers):

@@ -80,6 +80,9 @@ class Facets(Members, Patched):
     def may_meet(self, cell, k, here):
         return _passes(self.grid, cell.number, k, here)
 
+    def misses(self, m, seen, longest):
+        return _misses(self, m, seen, longest)
+
     def keeps(self, number, r):
         is_other = (number < 0.0) | (number >= self.count())
         return is_other or self.is_there(number, r, 0.0) or self.wall_after(number, r, 0.0) >= 0.0
@@ -100,6 +103,13 @@ class Facets(Members, Patched):
 
     def wall_after(self, number, r, near):
         return _on_plane_of(self, number, r, near)
+
+
+@outlined
+def _misses(facets, m, seen, longest):
+    # What is past its plane, by however little, is asked how far.
+    facet = member(facets, m)
+    return (facet.phi(seen.r) <= 0.0) & facet.way_past(seen, longest).misses
 
 
 @outlined

@@ -150,6 +150,10 @@ class Members(Record):
         """What `may_meet` asks of a flight that is so long in a cell [s]."""
         return
 
+    def misses(self, m, seen, longest):
+        """Whether a flight, seen in the frame of the field, surely misses one of its bodies for so long."""
+        return False
+
     def may_meet(self, cell, k, here):
         """Whether that flight may meet the body of an entry of the cell."""
         return True

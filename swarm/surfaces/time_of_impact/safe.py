@@ -79,8 +79,10 @@ def _nearest_in_cell(field, number, found, flight, t, longest):
     here = field.body.way_in_cell(cell, seen, min(found.time, longest))
     for k in range(first, stop):
         if field.body.may_meet(cell, index(k - first), here):
-            m = grid.entries[k]
-            found = _nearer(seen, member(field.body, index(m)), number + m, found, min(found.time, longest))
+            m, within = grid.entries[k], min(found.time, longest)
+            if field.body.misses(index(m), seen, within):
+                continue
+            found = _nearer(seen, member(field.body, index(m)), number + m, found, within)
     return found
 
 
