@@ -8,6 +8,7 @@ import pytest
 import swarm
 from swarm.contact import crossing, touching
 from swarm.contact.projection import Touch
+from swarm.kernel.gravity import Gravity
 from swarm.kernel.vector import Vec, norm, vec
 from swarm.lanes import flight
 from swarm.observables import drift
@@ -15,7 +16,7 @@ from swarm.surfaces.in_motion import moving
 from swarm.surfaces.in_motion.drive import drive_of
 from swarm.surfaces.rotation import Rotated
 from swarm.surfaces.shapes.plane import PlaneNumbers
-from swarm.surfaces.time_of_impact.rising import InWallFrame
+from swarm.surfaces.time_of_impact.rising import InWallFrame, flight_of
 
 DOWN = (0.0, 0.0, -9.81)
 SHIFTED = swarm.Translation((0.05, 0.02, -0.03))
@@ -231,6 +232,22 @@ def test_the_bound_of_a_jerk_along_a_normal_does_not_depend_on_the_frame_of_a_bo
     turned = Rotated(PlaneNumbers(Vec(0.0, 0.0, 1.0), 0.5), Vec(0.0, 0.0, 1.0), Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0))
     wanted = PlaneNumbers(Vec(1.0, 0.0, 0.0), 0.5).moving_step(seen, 1.0)
     assert turned.moving_step(seen, 1.0) == pytest.approx(wanted, rel=1e-14)
+
+
+@pytest.mark.parametrize("swings", [False, True])
+def test_a_flight_in_the_frame_of_a_mesh_that_turns_is_a_cubic_but_for_the_rest_of_its_jerk(swings):
+    turn = swarm.Rotation((1.0, -2.0, 0.5), 1.3, (0.1, 0.2, -0.3))
+    motion = turn + swarm.Oscillation((0.1, 0.0, 0.05), 0.4) if swings else turn
+    drive = drive_of(cube(motion=motion), 2.0)
+    free = flight_of(vec([0.1, 0.2, 0.3]), vec([1.0, 0.5, -0.2]), Gravity(*DOWN), 1.7)
+    wall = moving.TurningWall(None, drive)
+    now = wall.seen(free, 0.0)
+    assert now.jerk(0.0).rest == drive.jerk
+    for t in (0.01, 0.1, 0.3):
+        jerk = now.jerk(t)
+        off = np.linalg.norm(np.array(wall.seen(free, t).r) - np.array(now.place(t, jerk)))
+        assert off <= jerk.rest * t**3 / 6.0 + 1e-14
+        assert jerk.rest < now.bounds(t).jerk
 
 
 @pytest.mark.long
