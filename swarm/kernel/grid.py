@@ -162,7 +162,7 @@ def _until_next_layer(layers, place, x, v, pull):
     low, width, margin, count = layers
     if pull is None:
         never = select(v > 0.0, place >= count, place < 0.0)
-        return select(never, np.inf, _edge_quotient((low, width, margin), place, place, x, v).time())
+        return select(never, np.inf, _until_edge((low, width, margin), place, place, x, v))
     among, below = (place >= 0.0) & (place < count), place < 0.0
     sign, face = select(below, 1.0, -1.0), select(below, low + margin, low + count * width - margin)
     b = 0.5 * v
@@ -214,9 +214,19 @@ def _until_out_of_layers(layers, first, last, x, v, pull):
 
 def _edge_quotient(layers, first, last, x, v):
     """When a straight flight leaves layers of cells, and a margin, as a `Quotient`."""
+    way = _edge(layers, first, last, v) - x
+    return Quotient(*select(v == 0.0, tuple(NEVER), (select(v > 0.0, way, -way), abs(v))))
+
+
+def _until_edge(layers, first, last, x, v):
+    """The same as a time, where it is that of one axis."""
+    return select(v == 0.0, np.inf, (_edge(layers, first, last, v) - x) / v)
+
+
+def _edge(layers, first, last, v):
+    """Where a straight flight leaves them."""
     (low, width, margin), ahead = layers, v > 0.0
-    edge = low + select(ahead, last + 1.0, first) * width + select(ahead, margin, -margin)
-    return Quotient(*select(v == 0.0, tuple(NEVER), (select(ahead, edge - x, x - edge), abs(v))))
+    return low + select(ahead, last + 1.0, first) * width + select(ahead, margin, -margin)
 
 
 # --- How it is made --------------------------------------------------------------------------------------
