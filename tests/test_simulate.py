@@ -185,7 +185,7 @@ def test_bad_arguments_are_named(keywords, words):
 def test_wrong_types_are_named(argument):
     arguments = {"scene": SPHERE, "particles": swarm.fill(SPHERE, 2, speed=1.0), "method": swarm.Impact()}
     arguments[argument] = "impact"
-    with pytest.raises(swarm.SceneError, match=f"{argument} must be a swarm.* got str"):
+    with pytest.raises(swarm.SceneError, match=f"{argument} must be a swarm.* got 'impact'"):
         swarm.simulate(**arguments, until=1.0)
 
 

@@ -136,11 +136,11 @@ def _warn_of_light(task: Task) -> None:
     """Warn where a temperature in kelvin, or a speed of another unit, makes particles faster than light."""
     particles = task.particles
     heat = max((one.temperature or 0.0 for one in task.scene.surfaces), default=0.0)
-    hot = math.sqrt(heat / float(particles.mass.min())) if len(particles) else 0.0
-    if own := workload.beyond_light(particles.fastest()):
-        _LOG.warning("a particle has %.2g m/s%s", particles.fastest(), own)
-    elif own := workload.beyond_light(hot):
-        _LOG.warning("a wall of the temperature %g J gives %.2g m/s%s", heat, hot, own)
+    hot, fastest = math.sqrt(heat / float(particles.mass.min())) if len(particles) else 0.0, particles.fastest()
+    if fastest > workload.LIGHT:
+        _LOG.warning("a particle has %.2g m/s, %s", fastest, workload.BEYOND_LIGHT)
+    elif hot > workload.LIGHT:
+        _LOG.warning("a wall of the temperature %g J gives %.2g m/s, %s", heat, hot, workload.BEYOND_LIGHT)
 
 
 def _warn_of_rest(task: Task) -> None:

@@ -24,8 +24,12 @@ _PARTICLES, _PARTS = 4, 8
 # Chords of a walk through the volume, and how many of the last of them count.
 _CHORDS, _COUNTED = 60, 30
 
-# The speed of light [m/s], and k_B T at 300 K [J].
-_LIGHT, _ROOM = 299_792_458.0, 300.0 * 1.380649e-23
+# The speed of light [m/s], and what to say of a higher one, which only another unit can mean, with k_B T at 300 K.
+LIGHT = 299_792_458.0
+BEYOND_LIGHT = (
+    "which is above the speed of light: speeds are in m/s, masses in kg, and a temperature is k_B T in J, at 300 K "
+    f"{300.0 * 1.380649e-23:.3g} J"
+)
 
 
 class Flights(NamedTuple):
@@ -60,7 +64,7 @@ def require_few_impacts(
             f"at its speed it flies {found.between:.2g} s from impact to impact, mostly at surfaces[{i}] "
             f"({type(compiled.scene.surfaces[i]).__name__}), and a frame lasts {every:g} s; make that surface wider, "
             f"the particles slower, or every at most {_MOST_A_FRAME * found.between:.2g} s"
-            + (f"; the fastest has {fastest:.2g} m/s{beyond}" if (beyond := beyond_light(fastest)) else "")
+            + (f"; the fastest has {fastest:.2g} m/s, {BEYOND_LIGHT}" if fastest > LIGHT else "")
         )
     impacts = len(particles) * (until / found.between)
     if impacts > _MANY:
@@ -68,16 +72,6 @@ def require_few_impacts(
             "the run will take about %.1e impacts, %.1e of each particle, which flies %.1e s from impact to impact",
             impacts, until / found.between, found.between,
         )  # fmt: skip
-
-
-def beyond_light(speed: float) -> str:
-    """What to add to a sentence on a speed [m/s] that only another unit can mean; else ""."""
-    if speed <= _LIGHT:
-        return ""
-    return (
-        ", which is above the speed of light: speeds are in m/s, masses in kg, and a temperature is k_B T in J, at "
-        f"300 K {_ROOM:.3g} J"
-    )
 
 
 def time_between(compiled: CompiledScene, particles: Particles) -> float:
