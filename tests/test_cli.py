@@ -250,7 +250,10 @@ def test_json_of_a_run_that_is_interrupted(folder, options):
 def test_json_of_a_run_that_is_interrupted_before_its_first_frame(folder, options):
     """What was there before is not this run's, and there is nothing to resume from."""
     if "--overwrite" in options:
+        # A complete run of the same scene would not be replaced with --resume.
+        (folder / "scene.toml").write_text(GOOD.replace("speed = 0.5", "speed = 0.4"))
         assert command("run", "scene.toml", cwd=folder).returncode == 0
+        (folder / "scene.toml").write_text(GOOD)
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
 
     def interrupted(*about):
