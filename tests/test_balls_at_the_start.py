@@ -70,9 +70,9 @@ def test_a_bad_start_is_one_sentence(scene, particles, method, options, sentence
 def test_sources_of_points_do_not_go_with_balls():
     source = swarm.Source(0, rate=1.0, speed=1.0)
     with pytest.raises(
-        swarm.SceneError, match=r"sources\[0\].radius must be given where the other particles of the run have a radius"
+        swarm.SceneError, match=r"sources\[1\].radius must be given where the other particles of the run have a radius"
     ):
-        admitted(VESSEL, balls(), sources=[source])
+        admitted(VESSEL, None, sources=[swarm.Source(0, rate=1.0, speed=1.0, radius=0.01), source])
 
 
 def test_balls_that_touch_by_round_off_are_admitted():

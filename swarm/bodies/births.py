@@ -54,9 +54,10 @@ def with_born(scene: Scene, bodies: Bodies, sources: tuple[Source, ...], seed: i
         )
     mass = float(body.mass_matrix.sum())
     for k, one in enumerate(sources):
-        if one.radius is not None:
-            raise SceneError(f"sources[{k}].radius must be left out with bodies, got {one.radius}: the body has a size")
-        if one.mass not in (1.0, mass):
+        for name, it_has in (("radius", "a size"), ("density", "a mass")):
+            if (got := getattr(one, name)) is not None:
+                raise SceneError(f"sources[{k}].{name} must be left out with bodies, got {got}: the body has {it_has}")
+        if one.mass not in (None, mass):
             raise SceneError(f"sources[{k}].mass must be that of the body, {mass:g} kg, or left out, got {one.mass:g}")
     around = tuple(replace(one, radius=reach_of(body), mass=mass) for one in sources)
     centers = _centers(bodies)

@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +53,7 @@ def with_births(
         return particles
     given = 0 if particles is None else len(particles)
     _require_room(sources, given, until)
+    sources = tuple(_as_at_the_start(one, f"sources[{k}]", particles) for k, one in enumerate(sources))
     has_radius = sources[0].radius is not None if particles is None else particles.radius is not None
     for k, one in enumerate(sources):
         if (one.radius is not None) != has_radius:
@@ -70,12 +73,12 @@ def with_births(
     order = np.argsort(times, kind="stable")
     number = np.repeat(np.arange(len(sources), dtype=np.int32), [len(time) for time, _r, _v in drawn])[order]
     position, velocity = (np.concatenate([one[k] for one in drawn], axis=1)[:, order] for k in (1, 2))
-    mass = np.array([one.mass for one in sources])[number]
+    mass = np.array([one.mass or math.nan for one in sources])[number]
     radius, spin = _sizes(scene, sources, number, seed) if has_radius else (None, None)
     if radius is not None:
         density = np.array([one.density or math.nan for one in sources])[number]
         volume = math.pi * radius**2 if scene.plane else 4.0 / 3.0 * math.pi * radius**3
-        mass = np.where(np.isnan(density), mass, density * volume)
+        mass = np.where(np.isnan(mass), density * volume, mass)
     image = None if scene.period is None else np.zeros((3, len(times)), np.int64)
     if particles is not None:
         position = np.concatenate([particles.position, position], axis=1)
@@ -98,6 +101,28 @@ def with_births(
         np.append(np.zeros(given), times[order]), number, len(sources), sources if has_radius else ()
     )  # fmt: skip
     return made
+
+
+def _as_at_the_start(source: Source, name: str, particles: Particles | None) -> Source:
+    """The source with all that it leaves out: of balls the radius and the mass of those of the start, or 1 kg."""
+    given: dict[str, Any] = {}
+    if particles is not None and particles.radius is not None and source.radius is None:
+        given["radius"] = _common(particles.radius, f"{name}.radius", "have radii", "m")
+        if source.mass is None and source.density is None:
+            given["mass"] = _common(particles.mass, f"{name}.mass", "have masses", "kg")
+    elif source.mass is None and source.density is None:
+        given["mass"] = 1.0
+    return replace(source, **given)
+
+
+def _common(values: Floats, name: str, have: str, unit: str) -> float:
+    """What all particles of the start have."""
+    low, high = float(values.min()), float(values.max())
+    if low != high:
+        raise SceneError(
+            f"{name} must be given where the particles of the start {have} from {low:g} to {high:g} {unit}, got None"
+        )
+    return low
 
 
 def _sizes(
@@ -277,7 +302,7 @@ def from_volume(source: Source, random: Random, n: int, across: int | None) -> F
     if across is not None:
         normal[across] = 0.0
     if source.temperature is not None:
-        return np.asarray(math.sqrt(source.temperature / source.mass) * normal)
+        return np.asarray(_thermal(source) * normal)
     return np.asarray((source.speed or 0.0) * normal / np.sqrt((normal**2).sum(axis=0)))
 
 
@@ -288,11 +313,10 @@ def from_surface(source: Source, random: Random, normals: Floats, across: int | 
         return _into(source, random, normals, across)
     first, second = _tangents(normals, across)
     if source.temperature is not None:
-        scale = math.sqrt(source.temperature / source.mass)
         # The normal speed of what passes a plane in a gas at rest: w exp(-w^2/2).
         away = np.sqrt(2.0 * random.standard_exponential(n))
         u, w = random.spawn(1)[0].standard_normal((n, 2)).T
-        return np.asarray(scale * (u * first + w * second - away * normals))
+        return np.asarray(_thermal(source) * (u * first + w * second - away * normals))
     if across is not None:
         sine = 2.0 * random.random(n) - 1.0
         direction = sine * first
@@ -301,6 +325,13 @@ def from_surface(source: Source, random: Random, normals: Floats, across: int | 
         sine, angle = np.sqrt(part), 2.0 * math.pi * turn
         direction = sine * (np.cos(angle) * first + np.sin(angle) * second)
     return np.asarray((source.speed or 0.0) * (direction - np.sqrt(1.0 - sine * sine) * normals))
+
+
+def _thermal(source: Source) -> float:
+    """sqrt(k_B T/m) of the gas that comes [m/s]."""
+    assert source.temperature is not None
+    assert source.mass is not None
+    return math.sqrt(source.temperature / source.mass)
 
 
 def _tangents(normals: Floats, across: int | None) -> tuple[Floats, Floats]:

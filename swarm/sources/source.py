@@ -80,10 +80,11 @@ class Source(Validated):
         beam: the velocity of all, three numbers [m/s].
         divergence: of a beam the half angle of a cone about it in which directions are uniform [rad], below pi; those
             into a wall on which particles are born do not occur.
-        mass: of each [kg].
-        radius: of balls [m], one number, or (low, high): uniform between them; None: points. Births of balls overlap
-            neither balls nor walls, each at up to 16 random places. On a wall balls touch it with their surface, on
-            another surface and in a volume their centres are there, everywhere as far as the largest one fits.
+        mass: of each [kg]; None: 1 kg, of balls without a `radius` here that of the particles of the start.
+        radius: of balls [m], one number, or (low, high): uniform between them; None: that of the particles of the
+            start, which must all have the same, or points. Births of balls overlap neither balls nor walls, each at up
+            to 16 random places. On a wall balls touch it with their surface, on another surface and in a volume their
+            centres are there, everywhere as far as the largest one fits.
         density: of balls [kg/m^3], in a plane [kg/m^2], in place of a mass.
         spin: of balls and bodies: the angular speed about random axes, or three numbers, the angular velocity [rad/s].
         blocked: of balls and bodies, what becomes of a birth that finds no free place: "wait", it and those after it
@@ -114,7 +115,7 @@ class Source(Validated):
     speed: Magnitude | None = None
     beam: Annotated[Any, _beam] | None = None
     divergence: NotNegative = 0.0
-    mass: Annotated[float, _mass] = 1.0
+    mass: Annotated[float, _mass] | None = None
     radius: Annotated[Any, _radius] | None = None
     density: Annotated[float, _mass] | None = None
     spin: Annotated[Any, _spin] = 0.0
@@ -125,7 +126,8 @@ class Source(Validated):
         self._check_place()
         self._check_times()
         self._check_velocity()
-        self._check_balls()
+        if self.mass is not None and self.density is not None:
+            raise SceneError(f"a source needs one of mass and density, got {self.mass:g} kg and {self.density:g}")
 
     def __repr__(self) -> str:
         """The call that makes it, omitting defaults."""
@@ -190,18 +192,9 @@ class Source(Validated):
         if self.divergence > 0.0 and self.beam is None:
             raise SceneError(f"divergence must go with a beam, got {self.divergence:g} without one; give beam=")
 
-    def _check_balls(self) -> None:
-        if self.radius is None:
-            if self.density is not None:
-                raise SceneError(
-                    f"density must be left out without a radius, got {self.density:g}: give radius=, or the mass"
-                )
-        elif self.density is not None and self.mass != 1.0:
-            raise SceneError(f"a source needs one of mass and density, got {self.mass:g} kg and {self.density:g}")
-
     def require_points(self, name: str) -> None:
         """Raise a `SceneError` where it asks for what points do not have."""
-        given = {"spin": self.spin == 0.0, "blocked": self.blocked == "wait"}
+        given = {"density": self.density is None, "spin": self.spin == 0.0, "blocked": self.blocked == "wait"}
         if self.radius is None and (wrong := [key for key, is_left_out in given.items() if not is_left_out]):
             raise SceneError(
                 f"{name}.{wrong[0]} must be left out without a radius, got {getattr(self, wrong[0])}: the particles "

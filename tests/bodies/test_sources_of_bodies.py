@@ -107,6 +107,8 @@ def test_a_source_that_does_not_fit_the_body_is_refused():
     scene = swarm.Scene([ROOM])
     for given, sentence in (
         ({"radius": 0.1}, r"sources\[0\].radius must be left out with bodies, got 0.1: the body has a size"),
+        ({"density": 3.0}, r"sources\[0\].density must be left out with bodies, got 3.0: the body has a mass"),
+        ({"density": 3.0}, r"sources\[0\].density must be left out with bodies, got 3.0: the body has a mass"),
         ({"mass": 3.0}, r"sources\[0\].mass must be that of the body, 2 kg, or left out, got 3"),
         ({"where": swarm.Sphere(0.01, (0.49, 0.0, 0.0))}, r"sources\[0\].where must leave a place within the walls"),
     ):

@@ -207,10 +207,33 @@ def test_exports_hold_those_that_were_born(tmp_path):
     assert set(held) == {0, 3, 4}
 
 
+def test_a_source_without_a_radius_has_that_of_the_grains_at_the_start():
+    scene, lid = swarm.Scene([ROOM], **FALL), {"volume": True, "rate": 200.0, "even": True, "speed": 0.1}
+    start = swarm.Particles([[-0.02, 0.02], [0, 0], [-0.03, -0.03]], np.zeros((3, 2)), 0.007, radius=0.012)
+    options = {"until": 0.05, "compile": "never", "seed": 1}
+    given = {"like those at the start": {}, "said": BALL, "by the density": {"density": 2.0}}
+    runs = {
+        name: swarm.simulate(scene, start, SOFT, sources=swarm.Source(LID, **lid, **more), **options)
+        for name, more in given.items()
+    }
+    assert runs["said"].observables["born"][-1] > 1
+    same(runs["like those at the start"], runs["said"])
+    np.testing.assert_allclose(runs["by the density"].particles.mass[2:], 2.0 * 4 / 3 * np.pi * 0.012**3)
+
+    def refusal(mass, radius, **more):
+        unlike = swarm.Particles(start.position, start.velocity, mass, radius=radius)
+        with pytest.raises(swarm.SceneError) as error:
+            swarm.simulate(scene, unlike, SOFT, sources=swarm.Source(LID, **lid, **more), **options)
+        return str(error.value)
+
+    must = "must be given where the particles of the start have"
+    assert refusal(0.007, [0.01, 0.012]) == f"sources[0].radius {must} radii from 0.01 to 0.012 m, got None"
+    assert refusal([0.007, 0.008], 0.012) == f"sources[0].mass {must} masses from 0.007 to 0.008 kg, got None"
+
+
 def test_arguments():
     bad = {
         "low <= high": {"radius": (0.02, 0.01)},
-        "must be left out without a radius": {"density": 1.0},
         "one of mass and density": {"radius": 0.01, "density": 1.0, "mass": 2.0},
         "blocked": {"radius": 0.01, "blocked": "never"},
     }

@@ -217,7 +217,7 @@ def test_runs_that_support_no_sources():
     bodies = swarm.place(SPHERE, swarm.dumbbell(0.1, 1.0), 2, speed=1.0)
     with pytest.raises(swarm.SceneError, match=r"sources must be left out with bodies and Penalty, got 1: a body is"):
         run(SPHERE, source, bodies, swarm.Penalty(dt=1e-2, penalty=1e3))
-    for given in ({"spin": 1.0}, {"blocked": "report"}):
+    for given in ({"density": 1.0}, {"spin": 1.0}, {"blocked": "report"}):
         with pytest.raises(
             swarm.SceneError, match=rf"sources\[0\].{next(iter(given))} must be left out without a radius"
         ):
