@@ -314,7 +314,10 @@ class Smooth(AtRest):
         return False
 
     def outward_acceleration(self, r, v, pull):
-        """The outward acceleration of a free flight along the wall [m/s^2]; above 0 the particle stays on the wall."""
+        """The outward acceleration of a free flight along the wall [m/s^2]; above 0 the particle stays on the wall.
+
+        The velocity must have no part across the wall.
+        """
         if not self.gives("hessian"):
             return curvature.outward_acceleration(self, r, v, pull)
         # The second derivative of the distance, (2 v.H v + grad q.G)/|grad q|

@@ -56,6 +56,18 @@ def test_a_ball_slides_along_a_cavity(restitution):
     assert seen.observables["energy_error"].max() < 1e-12
 
 
+@pytest.mark.parametrize(
+    "wall", [swarm.Sphere(0.5, restitution=0.5), swarm.Ellipsoid((0.5,) * 3, restitution=0.5)], ids=["R", "a, b, c"]
+)
+def test_a_ball_leaves_a_round_wall_as_fast_as_its_motion_along_the_wall_asks(wall):
+    """v_t^2/rho brings it back in t_c: it leaves with v_n = v_t^2 t_c/(2 rho), in equal descriptions of a wall."""
+    duration, rho, along = 0.2, 0.4, 1.0
+    scene, velocity = swarm.Scene([wall], pairs=swarm.Pairs(contact_duration=duration)), (0.4, along, 0.0)
+    seen = run(scene, ball(np.array([rho, 0.0, 0.0]) - 0.1 * np.array(velocity), velocity), 0.11)
+    expected = -(along**2) * duration / (2.0 * rho), along, 0.0
+    np.testing.assert_allclose(seen.particles.velocity[:, 0], expected, rtol=1e-12, atol=1e-15)
+
+
 def test_a_ball_that_starts_along_an_elastic_cavity_goes_on():
     seen = run(swarm.Scene([swarm.Sphere(1.0)]), ball((0.0, 0.0, 0.9), (1.0, 0.0, 0.0)), 1e-3)
     np.testing.assert_allclose(seen.particles.position[0, 0], 0.9 * math.sin(1e-3 / 0.9), rtol=1e-9)

@@ -150,9 +150,11 @@ def _lifted(box, walls, wall, r, turned):
     # Few leave so slowly that the wall is asked again.
     if 0.5 * turned.twice_away > _SURELY * max(most, _PARTS * norm(turned.v)):
         return turned
-    n, held = walls.unit_normal(wall, r), walls.outward_acceleration(wall, r, turned.v, pull)
+    n = walls.unit_normal(wall, r)
+    away = -dot(n, w)
+    held = walls.outward_acceleration(wall, r, turned.v + away * n, pull)
     # At least so fast that its own velocity has digits of it
-    least, away = max(min(0.5 * held * box.shortest, most), _PARTS * norm(turned.v)), -dot(n, w)
+    least = max(min(0.5 * held * box.shortest, most), _PARTS * norm(turned.v))
     # An absorbed ball stays as it is.
     if away < least and turned.wait < math.inf:
         lift = least - away
