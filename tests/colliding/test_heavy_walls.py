@@ -112,6 +112,22 @@ def test_a_ball_and_a_piston_in_line(restitution):
     assert seen["energy_error"] < 1e-14
 
 
+@pytest.mark.parametrize("inertia", [0.01, 1e6])
+@pytest.mark.parametrize("spin", [None, (0.0, 0.0, 0.0)], ids=["without a spin", "with one"])
+def test_friction_of_a_drum_acts_where_a_ball_touches_it(spin, inertia):
+    """Where the slip stops, v = a w: the impulse at the rim is J = (v0 - a w0)/(1/m + a^2/I [+ 5/(2 m)])."""
+    mass, radius, a, rate, along = 0.3, 0.1, 0.2, 2.0, 1.0
+    hinge = swarm.Rotation((0.0, 0.0, 1.0), rate)
+    drum = swarm.Cylinder(a, side="outside", friction=50.0, inertia=inertia, motion=hinge)
+    balls = swarm.Particles((0.35, -0.05 * along, 0.1), (-1.0, along, 0.0), mass, radius=radius, spin=spin)
+    pairs = None if spin is None else swarm.Pairs(friction=0.5)
+    _position, velocity, seen = frames(run_of(swarm.Scene([BOX, drum], pairs=pairs), balls), [0.06])
+    give = 1.0 / mass + a * a / inertia + (0.0 if spin is None else 2.5 / mass)
+    impulse = (along - a * rate) / give
+    assert velocity[:, 0] == pytest.approx([1.0, along - impulse / mass, 0.0], rel=1e-12)
+    assert seen["energy_error"] < 1e-14
+
+
 @pytest.mark.parametrize("duration", [0.0, 0.1, 0.3])
 @pytest.mark.parametrize(
     "wall", [plate(2.0, restitution=0.4), swarm.Sphere(0.02, side="outside", mass=2.0, restitution=0.4)],

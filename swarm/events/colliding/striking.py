@@ -11,7 +11,7 @@ from ...kernel.jit import outlined, select
 from ...kernel.vector import ZERO, square
 from ...lanes.watching.log import Struck
 from ..reacting.freedoms import TOO_LONG, TOO_SHORT, ParticleFlight
-from ..reacting.strikes import Turner, all_stay, exit_at, strike, with_energy
+from ..reacting.strikes import Ball, all_stay, exit_at, strike, with_energy
 from .again import aim_again, queue_both, vanish
 from .bounce import FLIES, let_out
 from .clock import EVENTS, moment_of
@@ -73,16 +73,14 @@ def strike_heavy(box, flock, books, clock, i, now):
 def _blow(box, flock, wall, flight, ball):
     """The `WallImpact` of a ball, given as its number and how many impacts it has had."""
     (i, impacts), heavy = ball, box.heavy
-    radius, random, turner = box.kinds.radius_of(i), None, None
+    radius, random = box.kinds.radius_of(i), None
     walls = heavy.grown(radius)
     if box.loss is not None:
         spares = box.loss.spares(flock, i, flight.time)
         walls = tuple(one._replace(restitution=select(spares, 1.0, one.restitution)) for one in walls)
     if box.source is not None:
         random = box.source.of_impact(i, impacts, box.laws)
-    if box.turning is not None:
-        turner = Turner(i, radius, box.turning)
-    return strike(walls, wall, heavy.freedoms, flight, box.kinds.mass_of(i), random, turner)
+    return strike(walls, wall, heavy.freedoms, flight, box.kinds.mass_of(i), random, Ball(i, radius, box.turning))
 
 
 def _book(box, books, i, blow):

@@ -32,8 +32,8 @@ class WallImpact(NamedTuple):
     stays: Any = True  # False where the law absorbs the particle, which keeps its velocity
 
 
-class Turner(NamedTuple):
-    """A ball that turns: its number, its radius, and the `BallSpins` of all."""
+class Ball(Record):
+    """A ball: its number, its radius, and the `BallSpins` of all; None where balls do not turn."""
 
     i: Any
     radius: float
@@ -102,16 +102,17 @@ class Reacting(Record):
         foot = surface.own_place(flight.r + radius * surface.unit_normal(flight.r))
         return lets_through(self.openings, Walls((self.body,)), self.number, foot, 0.0)
 
-    def strike(self, walls, flight, mass, random=None, turner=None):
-        """The impact of a particle on it: its `WallImpact`."""
+    def strike(self, walls, flight, mass, random=None, ball=None):
+        """The impact of a particle, a `Ball` or a point, on it: its `WallImpact`."""
         freedom = self.freedom
         surface = freedom.posed(self.body, walls, flight.time)
         # The time of the frame has fewer digits than the flight: without this a particle is found in the wall next
         # time.
         r = surface.project(flight.r)
-        n, arm = surface.unit_normal(r), freedom.arm(r)
+        n = surface.unit_normal(r)
+        touch = r if ball is None else r + ball.radius * n
+        arm, u = freedom.arm(touch), surface.velocity(touch)
         # J = (1 + e) n.(v - u)/(n^2/m + 1/M_n)
-        u = surface.velocity(r)
         speed = dot(n, u)
         approach = dot(n, flight.v) - speed
         approach = select(approach > 0.0, approach, 0.0)
@@ -129,12 +130,9 @@ class Reacting(Record):
         if self.laws.send_off:
             happens, law = self._by_law(r, n, flight.v - u, (mass, arm), random)
         if self.laws.friction is not None:
-            point = r if turner is None else r + turner.radius * n
-            at, there = freedom.arm(point), surface.velocity(point)
-            passing = flight.v - (impulse / mass) * n - there - freedom.response(whole, at)
-            more = self._rubbed(n, passing, (mass, at), select(happens, 0.0, impulse), turner)
+            passing = flight.v - (impulse / mass) * n - u - freedom.response(whole, arm)
+            more = self._rubbed(n, passing, (mass, arm), select(happens, 0.0, impulse), ball)
             whole, lost, turned = whole + more.impulse, lost + more.lost, more.turned
-            arm, u = either(happens, arm, at), either(happens, u, there)
         if law is not None:
             whole, heat = either(happens, law.impulse, whole), select(happens, law.heat, 0.0)
             lost, impulse = select(happens, law.lost, lost), select(happens, dot(n, law.impulse), impulse)
@@ -164,21 +162,22 @@ class Reacting(Record):
         half = 0.5 * mass
         return happens, LawImpulse(mass * spread.back(change), half * bounce.lost, half * bounce.heat, stays)
 
-    def _rubbed(self, n, passing, at, impulse, turner):
+    def _rubbed(self, n, passing, at, impulse, ball):
         """What friction takes, of a velocity relative to the wall after a normal impulse: `Rubbed`."""
         mass, arm = at
         slip, give = passing - dot(passing, n) * n, 1.0 / mass
-        if turner is not None:
-            slip, give = slip + turner.radius * cross(turner.turning.at(turner.i), n), give + 1.0 / (INERTIA * mass)
+        turns = ball is not None and ball.turning is not None
+        if turns:
+            slip, give = slip + ball.radius * cross(ball.turning.at(ball.i), n), give + 1.0 / (INERTIA * mass)
         speed = norm(slip)
         way = slip * (1.0 / select(speed > 0.0, speed, 1.0))
         give += self.freedom.mobility(way, arm)
         most, stops = self.laws.friction_of(self.number) * impulse, speed / give
         along = select(most < stops, most, stops)
         turned = 0.0
-        if turner is not None:
-            twist = (-along / (INERTIA * mass * turner.radius)) * cross(n, way)
-            turned = -0.5 * mass * turner.radius * turner.radius * turner.turning.add(turner.i, twist)
+        if turns:
+            twist = (-along / (INERTIA * mass * ball.radius)) * cross(n, way)
+            turned = -0.5 * mass * ball.radius * ball.radius * ball.turning.add(ball.i, twist)
         return Rubbed(along * way, along * (speed - 0.5 * along * give), turned)
 
 
@@ -225,11 +224,11 @@ def exit_at(reacting, wall, walls, flight, radius=0.0):
     return owner
 
 
-def strike(reacting, wall, walls, flight, mass, random=None, turner=None):
+def strike(reacting, wall, walls, flight, mass, random=None, ball=None):
     """The impact of a particle on the wall with this number: its `WallImpact`."""
     for number, one in numbered(reacting):
         if is_of(wall, number, one):
-            return one.one(wall - number).strike(walls, flight, mass, random, turner)
+            return one.one(wall - number).strike(walls, flight, mass, random, ball)
     return WallImpact(flight.r, flight.v, 0.0, 0.0, 0.0, -1, -1, ZERO)
 
 
