@@ -14,7 +14,7 @@ from conftest import METHODS, rarely
 
 import swarm
 from examples import long_run
-from swarm.files import checkpoint, paths
+from swarm.files import checkpoint, paths, writer
 from swarm.lanes import block as blocks
 from swarm.run import progress
 from swarm.run.engine import Run
@@ -389,7 +389,10 @@ def test_no_second_run_writes_the_same_trajectory(tmp_path, keywords):
 def test_a_checkpoint_that_cannot_be_written_leaves_the_last_one(tmp_path, monkeypatch):
     """The disk is full when it is half written: the run ends, and goes on later from the one before."""
     path = tmp_path / "run.h5"
-    sentence = r"cannot write the checkpoint .*No space left.*; make room there; the previous checkpoint is unchanged"
+    sentence = (
+        r"cannot write the checkpoint .*No space left.*; make room there; the previous checkpoint is unchanged; "
+        r"with resume the run goes on from .*run.h5.checkpoint"
+    )
     saved, real = [], np.savez
 
     def full(file, **entries):
@@ -410,6 +413,30 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_last_one(tmp_path, monke
     numbers = []
     run(path, resume=True, progress=lambda frame: numbers.append(frame.number))
     assert numbers == [2, 3, 4]
+
+
+@pytest.mark.parametrize(("failing", "every"), [("checkpoint", 600.0), ("frame", 600.0), ("frame", None)])
+def test_a_disk_that_is_full_before_the_first_checkpoint_leaves_nothing_to_resume(
+    tmp_path, monkeypatch, failing, every
+):
+    def full(*_given, **_more):
+        raise OSError(28, "No space left on device")
+
+    clock = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: clock[-1])
+
+    def fills(frame):
+        if frame.number == 2:
+            monkeypatch.setattr(*(checkpoint.np, "savez") if failing == "checkpoint" else (writer, "rows"), full)
+            clock.append(600.0 if failing == "checkpoint" else 0.0)
+
+    with pytest.raises(swarm.FileError, match=r"cannot write .*: No space left") as error:
+        run(tmp_path / "run.h5", checkpoint=every, progress=fills)
+    _cause, _remedy, *left = str(error.value).split("; ")
+    if every is None:
+        assert not left
+    else:
+        assert left[0].startswith("no checkpoint was saved before, so the run cannot be resumed: start a new run from ")
 
 
 def test_without_being_asked_for_there_is_no_checkpoint(tmp_path, monkeypatch):

@@ -55,7 +55,8 @@ def replaced(path: Path, what: str) -> Iterator[IO[bytes]]:
                 os.close(folder)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise FileError(f"cannot write the {what} {path}: {cause(error)}; the previous {what} is unchanged") from error
+        left = f"; the previous {what} is unchanged" * path.exists()
+        raise FileError(f"cannot write the {what} {path}: {cause(error)}{left}") from error
 
 
 @contextlib.contextmanager

@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from ..common.frames import FrameTimes
-from ..errors import CompleteError, SceneError, WallTimeError
+from ..errors import CompleteError, FileError, SceneError, WallTimeError
 from ..files import checkpoint, marks, paths
 from ..files.lock import only_writer
 from ..kernel.cache import Spent
@@ -53,6 +53,7 @@ class Session:
         # What identifies the run in its files, besides its texts.
         self.identity: dict[str, Any] = {}
         self._arrays: checkpoint.Arrays | None = None
+        self._is_under_way = self._has_checkpoint = False
         self._held = contextlib.ExitStack()
         self._log: Impacts | None = None
         # The time that the session has spent in compilations.
@@ -65,6 +66,19 @@ class Session:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._held.close()
+        if isinstance(error, FileError) and self._is_under_way:
+            raise FileError(f"{error}{self._way_on()}") from error
+
+    def _way_on(self) -> str:
+        """How a run goes on that could not write its files, as the end of a sentence."""
+        if self._has_checkpoint:
+            return f"; with resume the run goes on from {self._path}"
+        if not self._saves:
+            return ""
+        return (
+            "; no checkpoint was saved before, so the run cannot be resumed: start a new run from the last frame of "
+            "its trajectory (from = in [particles]), or start again, with overwrite and without resume"
+        )
 
     @property
     def first(self) -> int:
@@ -216,6 +230,7 @@ class Session:
                 self._log.total = self._job.rows
             run.restore(self._arrays, self._job.following is not None)
             self._arrays = {}
+        self._is_under_way, self._has_checkpoint = True, self._arrays is not None
 
     def frames(self, times: FrameTimes) -> Iterator[tuple[int, float, float]]:
         """The frames of this session: number, the time before, and the time [s].
@@ -283,6 +298,7 @@ class Session:
             rows=0 if self._log is None else self._log.total, sums="" if self._log is None else self._log.sums(),
         )  # fmt: skip
         checkpoint.save(self._path, job, run.arrays(), self._owners)
+        self._has_checkpoint = True
 
     def finish(self) -> None:
         """Remove the checkpoint, as all frames are written."""
