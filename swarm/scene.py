@@ -222,6 +222,18 @@ class Scene:
         reach = lambda images, rows: [one.reaching_outside(rows, radius, time) for one in images]  # noqa: E731
         return self._of_each(points, time, self.pieces_of_balls(float(radius.max(initial=0.0))).images, reach)
 
+    def lost(self, points: NDArray[np.float64], time: float) -> NDArray[np.bool_]:
+        """Whether balls with their centres at points (3, N) are beyond walls that they meet from both sides.
+
+        Walls that react are not asked: they are where impacts have moved them.
+        """
+        rows = points if self.period is None else into_cell(self.period, points)[0]
+        lost = np.zeros(points.shape[1], np.bool_)
+        for image in (image for images in self.pieces.images for image in images):
+            if image.is_there(time) and not image.reacts():
+                lost |= image.lost(rows, time)
+        return lost
+
     def _of_each(
         self, points: ArrayLike, time: float, images: Images, values: Callable[[Any, Any], Any]
     ) -> NDArray[np.float64]:

@@ -337,10 +337,13 @@ class BaseRun:
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
         """Raise a RunError that names the first particle that is not finite, or is outside rigid walls."""
-        scene = self._scene
-        if scene.reacts() and seen["max_penetration"] > self._deepest:
+        scene, state = self._scene, self._seen_state()
+        lost = np.zeros(state.mass.size, np.bool_)
+        if state.radius is not None:
+            lost = scene.lost(state.position, moment) & ~state.gone()
+        if scene.reacts() and (seen["max_penetration"] > self._deepest or lost.any()):
             scene = scene.placed(seen["wall_position"], seen["wall_orientation"])
-        failures.require_admissible(scene, self._seen_state(), seen, self._deepest, moment, self._first)
+        failures.require_admissible(scene, state, lost, seen, self._deepest, moment, self._first)
 
     # --- Calls of kernels --------------------------------------------------------------------------------
 

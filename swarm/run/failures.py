@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
@@ -115,20 +116,21 @@ def _unproved(scene: Scene, i: int) -> str:
 
 
 def require_admissible(
-    scene: Scene, state: State, seen: dict[str, Any], deepest: float, moment: float, first: int = 0
+    scene: Scene, state: State, lost: NDArray[np.bool_], seen: dict[str, Any], deepest: float, moment: float, first: int
 ) -> None:
-    """Raise a RunError where a state is not finite, or deeper than `deepest` [m] in a wall."""
+    """Raise a RunError where a state is not finite, deeper than `deepest` [m] in a wall, or a ball is `lost`."""
     # Whatever is not finite spreads to the energy or, if it is a position, to the angular momentum.
     if not (math.isfinite(seen["total_energy"]) and np.isfinite(seen["angular_momentum"]).all()):
         position = state.position[:, : len(state.mass)]
         good = np.isfinite(position).all(axis=0) & np.isfinite(state.velocity[:, : len(state.mass)]).all(axis=0)
         raise RunError(f"{_failed(moment)} {first + int(np.argmin(good))}: {Status.NOT_FINITE.sentence}")
-    if seen["max_penetration"] <= deepest:
+    position, size, radius = state.position[:, : len(state.mass)], scene.finite_size(), state.radius
+    if seen["max_penetration"] <= deepest and not lost.any():
         return
-    position, size = state.position[:, : len(state.mass)], scene.finite_size()
-    distances = scene.distances_outside(position, moment, None if state.balls is None else state.balls.radius)
+    distances = scene.distances_outside(position, moment, radius)
     # Far out in an open scene the round-off of a position is that of its own size.
     outside = distances > deepest / size * np.maximum(np.abs(position).max(axis=0), size)
+    outside |= lost & (distances > (0.0 if radius is None else radius))
     outside &= ~state.gone()
     if outside.any():
         wall, particle = np.unravel_index(int(np.argmax(distances * outside)), distances.shape)

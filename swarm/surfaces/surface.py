@@ -473,6 +473,13 @@ class Surface(Validated):
             walls = [wall.grown(0.0) for wall in self.walls_of_balls(0.0)]
             return np.asarray(np.maximum.reduce([wall.side * wall.phi(rows) for wall in walls]) + radius)
 
+    def lost(self, points: NDArray[np.float64], time: float) -> NDArray[np.bool_]:
+        """Whether balls with their centres at points (3, N) are beyond walls that they meet from both sides.
+
+        The distance from other walls says on which side a ball is.
+        """
+        return np.zeros(points.shape[1], np.bool_)
+
     def _own_rows(self, points: ArrayLike, time: float) -> Vec:
         """Points of the scene in the frame in which the surface is given."""
         rows = _rows(points)

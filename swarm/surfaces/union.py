@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .. import motion as motions
 from ..common.checks import Vector
@@ -194,6 +194,10 @@ class Joined(Surface):
         there = [surface for surface in self.surfaces() if surface.is_there(time)]
         away = np.full(points.shape[1], -math.inf)
         return np.asarray(np.max([away, *(one.reaching_outside(points, radius, time) for one in there)], axis=0))
+
+    def lost(self, points: Floats, time: float) -> NDArray[np.bool_]:
+        there = [surface for surface in self.surfaces() if surface.is_there(time)] if len(self.rooms) == 1 else []
+        return np.asarray(np.any([super().lost(points, time), *(one.lost(points, time) for one in there)], axis=0))
 
     # --- For users ---------------------------------------------------------------------------------------
 

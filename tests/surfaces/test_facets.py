@@ -12,6 +12,7 @@ import swarm
 from swarm import scene_file
 from swarm.kernel.grid import cell_of, entries_of, until_out
 from swarm.kernel.vector import Vec, vec
+from swarm.run.base import BaseRun
 from swarm.run.engine import Run
 from swarm.serialization import tables
 from swarm.surfaces.depth import penetration
@@ -302,6 +303,25 @@ def test_a_run_that_loses_a_particle_behind_a_facet_ends_with_a_sentence(monkeyp
     start = swarm.Particles(np.zeros((3, 3)), np.eye(3))
     with pytest.raises(swarm.RunError, match=r"particle 1: it is 0\.25 m outside surfaces\[0\] \(Mesh\)"):
         swarm.simulate(swarm.Scene([box_of_triangles()]), start, swarm.Impact(), until=1.0, compile="never")
+
+
+@pytest.mark.parametrize("motion", [None, swarm.Rotation((0.0, 0.0, 1.0), 2.0)], ids=["at rest", "turns"])
+@pytest.mark.parametrize("method", [swarm.Impact(), swarm.Penalty(dt=1e-2, penalty=1e4)], ids=["hard", "soft"])
+def test_a_run_that_loses_a_ball_behind_a_facet_ends_with_a_sentence(method, motion, monkeypatch):
+    """Balls meet triangles from both sides, which do not say on which one a ball is."""
+    advance, place = BaseRun.advance, np.array([0.0, 1.5, 0.3])
+
+    def lose(run, *given, **options):
+        done = advance(run, *given, **options)
+        run.state.position[:, 1] = place
+        return done
+
+    monkeypatch.setattr(BaseRun, "advance", lose)
+    start = swarm.Particles(0.5 * np.eye(3) - 0.2, np.zeros((3, 3)), radius=0.1)
+    scene = swarm.Scene([box_of_triangles(motion=motion)])
+    depth = 0.1 + scene.distances_outside(place[:, None], 1.0)[0, 0]
+    with pytest.raises(swarm.RunError, match=rf"particle 1: it is {depth:.3g} m outside surfaces\[0\] \(Mesh\)"):
+        swarm.simulate(scene, start, method, until=1.0, compile="never")
 
 
 @pytest.mark.parametrize("motion", [None, swarm.Rotation((1.0, 2.0, 3.0), 0.5, (0.3, 0.0, 0.0))])

@@ -9,9 +9,11 @@ import tomli_w
 
 import swarm
 from swarm.kernel.gravity import Gravity
-from swarm.kernel.vector import vec
+from swarm.kernel.vector import Vec, vec
+from swarm.run.base import BaseRun
 from swarm.serialization import tables
 from swarm.surfaces import ALL_SURFACES
+from swarm.surfaces.depth import penetration
 from swarm.surfaces.outlines.outline import Outline
 from swarm.surfaces.time_of_impact import flights
 
@@ -220,6 +222,30 @@ def test_around_a_solid_and_in_a_ring():
     end = run(ring, start, 10.0)
     assert ring.gaps(end.particles.position).max() < 1e-15
     assert (end.observables["impulse"][-1] > 0.0).all()
+
+
+@pytest.mark.parametrize("name", OUTLINES)
+def test_a_point_is_as_deep_as_it_is_outside_of_a_prism(name):
+    """However near it is to the plane of a lid, or to a side, which it is behind."""
+    prism = swarm.Prism(OUTLINES[name], 2.0)
+    points = np.random.default_rng(3).uniform(-4.0, 4.0, (3, 200))
+    walls = swarm.Scene([prism]).compiled().walls()
+    deep = [penetration(walls, Vec(*point)) for point in points.T.tolist()]
+    np.testing.assert_allclose(deep, np.maximum(prism.phi(points), 0.0), rtol=0.0, atol=1e-13)
+
+
+def test_a_run_that_loses_a_ball_outside_of_a_prism_ends_with_a_sentence(monkeypatch):
+    advance = BaseRun.advance
+
+    def lose(run, *given, **options):
+        done = advance(run, *given, **options)
+        run.state.position[:, 0] = (0.5, 0.5, 1.5)
+        return done
+
+    monkeypatch.setattr(BaseRun, "advance", lose)
+    start = swarm.Particles((0.5, 0.5, 0.0), (0.1, 0.0, 0.0), radius=0.1)
+    with pytest.raises(swarm.RunError, match=r"particle 0: it is 0\.6 m outside surfaces\[0\] \(Prism\)"):
+        swarm.simulate(swarm.Scene([swarm.Prism(L, 2.0)]), start, swarm.Impact(), until=1.0, compile="never")
 
 
 def test_a_prism_has_lids(compiled_at_once):

@@ -248,6 +248,9 @@ class Mesh(Surface):
     def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
         return np.asarray(side_sign(self.side) * self._nearest(points, time)[3] + radius)
 
+    def lost(self, points: Floats, time: float) -> NDArray[np.bool_]:
+        return super().lost(points, time) if self.open else ~self.contain(np.array(self._own_rows(points, time)))
+
     def wall_count(self, of_balls: bool) -> int:
         # Of points the two sides of a sheet are each a wall.
         return len(self) * (2 if self.open and not of_balls else 1)

@@ -301,6 +301,11 @@ class Outlined(Many):
     def reaching_outside(self, points: Floats, radius: Floats, time: float = 0.0) -> Floats:
         return np.asarray(side_sign(self.side) * self.phi(points, time) + radius)
 
+    def lost(self, points: Floats, time: float) -> NDArray[np.bool_]:
+        # Those that have come out of its box: phi takes some microseconds for each.
+        rows, (low, high) = np.array(self._own_rows(points, time)), np.array(self.bounds())[:, :, None]
+        return np.asarray(((rows < low) | (rows > high)).any(axis=0))
+
     def why_no_balls(self) -> str | None:
         return None
 

@@ -262,17 +262,21 @@ def _within(x, u, g, room):
 
 @outlined
 def _nearest(sides, r):
-    """The signed distance outside of the outline, and the number of the side that is nearest to a point."""
+    """How far a point is outside of the outline or beyond a lid, and the number of that side or lid."""
     if sides.is_gone():
         return -math.inf, -1.0
-    least, found, which = math.inf, -math.inf, -1.0
+    least, found, which, above, lid = math.inf, -math.inf, -1.0, -math.inf, -1.0
     # All of them: that of the cell that is nearest may be the back of a thin wall.
     for m in range(sides.table.shape[0]):
-        signed, away, _within = _beside(member(sides, index(m)), r)
+        side = member(sides, index(m))
+        signed, away, _within = _beside(side, r)
+        if _is_lid(side):
+            if signed > above:
+                above, lid = signed, float(m)
         # At a corner both its sides are at one distance, and it says the same of both.
-        if away < least:
+        elif away < least:
             least, found, which = away, signed, float(m)
-    return found, which
+    return (above, lid) if above > found else (found, which)
 
 
 def _beside(side, r):
