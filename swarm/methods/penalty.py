@@ -65,7 +65,8 @@ class Penalty(fixed_step.SoftWalls):
     restitution asked for at any speed. Friction sticks where it can, so that a pile comes to rest and stays so. It
     turns balls, with a moment of inertia of 2/5 m R^2, in a plane too. Balls that roll lose energy by `rolling` alone.
     `temperature` and `laws` of walls act on a ball where a contact ends, on the velocity that its dampers and its
-    friction leave, mirrored; the ball keeps its spin. Walls may move in any way.
+    friction leave, mirrored; the ball keeps its spin. Walls may move in any way. The impulses of friction and rolling
+    belong to a run and not to `Particles`: in a second run from `result.particles` they begin at 0.
 
     A contact should take 12 steps or more. A step in which the limit of friction, or a damper, is met to fewer digits
     than others is counted in "unconverged"; energy and momentum are those of the impulses that were used.
