@@ -253,7 +253,6 @@ class StepEnergy(NamedTuple):
 
     twice_energy: float  # per mass, at the start, and with the work of walls since
     over_mass: float  # the method's factor over the mass
-    unused: float
 
 
 class Steps(contract.MethodNumbers):
@@ -269,7 +268,7 @@ class Steps(contract.MethodNumbers):
         return 2.0 * energy, self.factor / mass, 0.0
 
     def own(self, first, second, third):
-        return StepEnergy(first, second, third)
+        return StepEnergy(first, second)
 
     @property
     def dissipates(self):
