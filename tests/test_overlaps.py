@@ -114,7 +114,10 @@ IN_ONE_PLACE = {
     "tiles": ([BRICK, swarm.Box((0.5, 0.5, 0.5), center=(1.0, 0.0, 0.0), side="outside")], "touch at a face"),
     "drums": ([COLUMN, swarm.Cylinder(0.1, length=0.4, center=(0.5, 0, 0.6), side="outside")], "touch at a face"),
     "tiles of a field": ([HALL, swarm.Boxes([[0.2 * k, 0.0, -0.3] for k in range(3)], (0.1,) * 3)], "touch at a face"),
-    "pegs of a field": ([FLOOR, swarm.Cylinders([[0.0, 0.0, 0.2]], 0.1, lengths=0.4)], "touch at a face"),
+    "pegs of a large field": (
+        [FLOOR, swarm.Cylinders([[0.3 * k, 0.0, 0.2] for k in range(201)], 0.1, lengths=0.4)],
+        "touch at a face",
+    ),
     "turned tiles": ([HALL, swarm.Boxes([[0, 0, 0], [0, 0.2, 0]], (0.1,) * 3, [[0, 1.0, 0, 0]] * 2)], "touch at a"),
     "a post that stays": ([swarm.Plane((0.0, 0.0, -1.0), present=[(0, 1)]), POST], "touch at a face"),
     "two bricks": ([BRICK, swarm.Box((0.5, 0.5, 0.5), center=(1.0, 0.9, 0.0), side="outside")], "touch at a face"),
@@ -131,6 +134,8 @@ NOT_IN_ONE_PLACE = {
     "a post in a corner": [LOW_ROOM, swarm.Box((0.1, 0.1, 0.2), center=(0.9, 0.9, 0.2), side="outside")],
     "a beam from wall to wall": [LOW_ROOM, swarm.Box((0.1, 1.0, 0.2), center=(0.0, 0.0, 0.5), side="outside")],
     "a column": [FLOOR, COLUMN],
+    "pegs of a field": [FLOOR, swarm.Cylinders([[0.3 * k, 0.0, 0.2] for k in range(3)], 0.1, lengths=0.4)],
+    "posts of a field": [PIT, swarm.Boxes([[0.5, 0.5 * k, 0.2] for k in range(2)], POST.half_widths)],
     "a mesh on a plane": [FLOOR, mesh_of(POST)],
     "a turned mesh": [FLOOR, mesh_of(POST, rotation={"axis": (0.0, 0.0, 1.0), "angle": 0.5})],
     "a post in a prism": [PIT, POST],
@@ -203,8 +208,15 @@ def test_what_slides_on_a_floor_meets_a_post_that_stands_on_it(post, gravity, ra
 
 
 @pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -9.81)])
-@pytest.mark.parametrize(("room", "post"), [(PIT, POST), (LOW_ROOM, mesh_of(POST)), (mesh_of(LOW_ROOM), POST)])
-def test_posts_stand_flush_on_prisms_and_meshes_too(room, post, gravity):
+@pytest.mark.parametrize(
+    ("room", "post"),
+    [
+        (PIT, POST), (LOW_ROOM, mesh_of(POST)), (mesh_of(LOW_ROOM), POST),
+        (LOW_ROOM, swarm.Boxes([POST.center, (0.5, 0.8, 0.2)], POST.half_widths)),
+    ],
+    ids=["prism", "post of a mesh", "mesh", "field"],
+)  # fmt: skip
+def test_posts_stand_flush_on_prisms_and_meshes_and_in_fields_too(room, post, gravity):
     one, other = slid_against(room, post, gravity, None), slid_against(LOW_ROOM, sunk(POST, 0.01), gravity, None)
     assert one.particles.velocity[0, 0] < 0.0
     np.testing.assert_allclose(one.particles.position, other.particles.position, atol=1e-12)

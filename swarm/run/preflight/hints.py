@@ -1,10 +1,9 @@
 """Warnings before a run starts, of what its user may not have meant: cavities, times, steps, gravity."""
 
-import dataclasses
 import itertools
 import logging
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,6 @@ from ...compiled_scene import CompiledScene
 from ...kernel.limits import EPSILON
 from ...methods import Impact
 from ...scene import Scene
-from ...surfaces.fields.many import Many
 from ...surfaces.instant import are_there_together, box_of, gaps_of, side_of
 from ...surfaces.presence.openings import least_distance
 from ...surfaces.surface import Surface
@@ -32,8 +30,6 @@ _STABLE = 2.0
 _LOOKED_AT = 1000
 # Two cavities are compared at so many points; a larger part of one beyond the other says that they cut one another.
 _POINTS, _CUT = 4096, 0.01
-# Surfaces, and bodies of fields, beyond this number are not compared.
-_COMPARED = 200
 _IN_ONE_PLACE = (
     "%s and %s have faces in one place, with the same side: an impact there follows the "
     "laws of either; leave that face of one out (open = [...] of a box), or let one stand in front of the other"
@@ -251,38 +247,29 @@ def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
         scene: the scene.
         of_points: whether points meet its walls. Balls do not fit into a gap of no width.
     """
-    bodies = list(itertools.islice(_bodies(scene), _COMPARED))
-    if len(bodies) < 2:
+    if len(scene.surfaces) < 2 and not any(one.body_count() for one in scene.surfaces):
         return
-    from ...surfaces.presence.flush import flush_faces, pairs_in_one_place  # loaded where there are two walls
+    from ...surfaces.presence import flush  # loaded where there are two walls
 
-    surfaces, size = [one for _name, one, _is_listed in bodies], scene.extent() or 1.0
+    bodies = list(itertools.islice(flush.bodies_of(scene.surfaces), flush.MOST_BODIES))
+    surfaces, size = [one.body for one in bodies], scene.extent() or 1.0
 
     def matters(one: Surface, other: Surface, are_back_to_back: bool) -> bool:
         return of_points and (one.is_solid() or other.is_solid()) if are_back_to_back else _differ(one, other)
 
-    # Only listed solids reach into what they stand on.
-    listed = [k for k, (_name, _one, is_listed) in enumerate(bodies) if is_listed]
-    closed = {(listed[i], face) for i, face in flush_faces([surfaces[k] for k in listed])} if of_points else set()
-    for pair in pairs_in_one_place(surfaces, size, matters):
+    # Those that reach into what they stand on.
+    reaching = [k for k, one in enumerate(bodies) if flush.may_reach(one, scene.surfaces)] if of_points else []
+    closed = {(reaching[i], face) for i, face in flush.flush_faces([surfaces[k] for k in reaching])}
+    for pair in flush.pairs_in_one_place(surfaces, size, matters):
         if not any(end in closed for end in zip(pair.surfaces, pair.faces, strict=True)):
             words = _ONLY_TOUCH if pair.are_back_to_back else _IN_ONE_PLACE
-            _LOG.warning(words, *(bodies[k][0] for k in pair.surfaces))
+            _LOG.warning(words, *(_named(scene.surfaces, *bodies[k][:2]) for k in pair.surfaces))
             return
 
 
-def _bodies(scene: Scene) -> Iterator[tuple[str, Surface, bool]]:
-    """The surfaces of a scene, of fields the first bodies: (name, surface, whether it is listed)."""
-    for i, surface in enumerate(scene.surfaces):
-        name = f"surfaces[{i}] ({type(surface).__name__})"
-        if not isinstance(surface, Many) or not surface.body_count() or surface.is_foam():
-            yield name, surface, True
-            continue
-        some = np.arange(min(len(surface), _COMPARED))
-        given = [one.name for one in dataclasses.fields(surface) if one.kw_only and one.name != "rotation"]
-        for k, body in enumerate(surface.images(some, surface.centers[some]).solids()):
-            laws = {name: getattr(surface, name) for name in given}
-            yield f"body {k} of {name}", dataclasses.replace(body, **laws), False
+def _named(surfaces: Sequence[Surface], number: int, row: int | None) -> str:
+    whole = f"surfaces[{number}] ({type(surfaces[number]).__name__})"
+    return whole if row is None else f"body {row} of {whole}"
 
 
 def _differ(one: Surface, other: Surface) -> bool:

@@ -51,6 +51,9 @@ _ROWS = {
 }
 
 
+_SIZES = "radii", "lengths", "half_widths", "semi_axes"
+
+
 class Many(Surface):
     """Solid bodies of one kind; particles live outside of all of them. They may overlap."""
 
@@ -156,6 +159,16 @@ class Many(Surface):
         object.__setattr__(made, "repeated", repeated)
         object.__setattr__(made, "which", which)
         return made
+
+    def with_bodies(self, bodies: dict[int, Surface]) -> "Many":
+        """The field with other places and sizes of the bodies in some rows."""
+        made = {
+            name: getattr(self, name).copy() for name in ("centers", *_SIZES) if getattr(self, name, None) is not None
+        }
+        for row, body in bodies.items():
+            for name, values in made.items():
+                values[row] = getattr(body, _ROWS[name].of_one)
+        return replace(self, **made)
 
     def numbers(self) -> list[int]:
         """The number of every body; of an image that of the body it is of."""

@@ -6,19 +6,30 @@ lies wholly on other walls is moved a small distance, the *reach*, into the regi
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...state import Floats
 from ..facets.flat import DIGITS, keys_of
+from ..fields.many import Many
 from ..instant import are_there_together, distances, side_of
 from ..surface import Surface
 from .seams import ENOUGH, FAR, OUTSIDE, PLACES, Face, faces_of
 
 # The reach, as a part of the size of the scene: more than `DIGITS` resolve, and than what counts as touching a wall.
 _REACH = 2e-9
+# A field of more bodies is left as it is: each body that stands on a wall takes some milliseconds.
+MOST_BODIES = 200
+
+
+class OneBody(NamedTuple):
+    """A surface, or a body of a field: its number among the surfaces, its row in the field or None, and itself."""
+
+    surface: int
+    row: int | None
+    body: Surface
 
 
 class Pair(NamedTuple):
@@ -104,13 +115,43 @@ def flush_faces(surfaces: Sequence[Surface]) -> dict[tuple[int, int], float]:
     return found
 
 
+def bodies_of(surfaces: Sequence[Surface]) -> Iterator[OneBody]:
+    """The surfaces, of fields the first bodies."""
+    for i, surface in enumerate(surfaces):
+        if not isinstance(surface, Many) or not surface.body_count() or surface.is_foam():
+            yield OneBody(i, None, surface)
+            continue
+        some = np.arange(min(len(surface), MOST_BODIES))
+        laws = {one.name: getattr(surface, one.name) for one in fields(surface) if one.kw_only}
+        del laws["rotation"]
+        for k, body in enumerate(surface.images(some, surface.centers[some]).solids()):
+            yield OneBody(i, k, replace(body, **laws))
+
+
+def may_reach(one: OneBody, surfaces: Sequence[Surface]) -> bool:
+    """Whether it is made to reach into a wall on which it stands."""
+    return one.row is None or surfaces[one.surface].body_count() <= MOST_BODIES
+
+
 def extended(surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
     """The surfaces of a scene, with solids that reach into the walls on which they stand."""
-    made = list(surfaces)
-    for (i, a), by in flush_faces(surfaces).items():
-        longer = face_of(made[i], a).longer
-        assert longer is not None
-        made[i] = longer(-by)
+    made, longer = list(surfaces), dict[int, Surface]()
+    looked_at = [one for one in bodies_of(surfaces) if may_reach(one, surfaces)]
+    for (k, a), by in flush_faces([one.body for one in looked_at]).items():
+        face = face_of(longer.get(k, looked_at[k].body), a)
+        assert face.longer is not None
+        longer[k] = face.longer(-by)
+    rows = dict[int, dict[int, Surface]]()
+    for k, body in longer.items():
+        i, row, _body = looked_at[k]
+        if row is None:
+            made[i] = body
+        else:
+            rows.setdefault(i, {})[row] = body
+    for i, bodies in rows.items():
+        field = surfaces[i]
+        assert isinstance(field, Many)
+        made[i] = field.with_bodies(bodies)
     return tuple(made)
 
 
