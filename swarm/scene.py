@@ -20,7 +20,7 @@ from .particles import Particles
 from .surfaces import plane as planes
 from .surfaces import required
 from .surfaces import rotation as rotations
-from .surfaces.instant import distances_of, gaps_of, gradient_of, has_room, planes_of
+from .surfaces.instant import box_of, distances_of, gaps_of, gradient_of, has_room, planes_of
 from .surfaces.periodic.images import Lengths, cell_of, into_cell, is_same_along, lengths_of
 from .surfaces.pieces import Images, Pieces, pieces_of
 from .surfaces.presence.doors import instants_of
@@ -51,6 +51,14 @@ def _surfaces(value: Any) -> tuple[Surface, ...]:
                 f"{checks.brackets(surface)}"
             )
     return given
+
+
+def _end_of(surface: Surface, n: ArrayLike, time: float) -> float:
+    """How far a solid, or a cavity, reaches along a direction at a time [s]; -inf where it has no end there."""
+    box = box_of(surface, time, filled=True) if surface.is_solid() else room_bounds((surface,), time)
+    along, (low, high) = np.asarray(n), np.array(box)
+    end = float(along @ np.where(along > 0.0, high, np.where(along < 0.0, low, 0.0)))
+    return end if math.isfinite(end) else -math.inf
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -315,12 +323,15 @@ class Scene:
         return [motions.pose(surface.motion, time) for surface in self.surfaces]
 
     def open_faces(self, time: float = 0.0) -> NDArray[np.float64]:
-        """Open faces through which gravity pulls no particle back: rows (*n, offset); n.r > offset is outside."""
+        """Open faces through which gravity pulls no particle back: rows (*n, offset); n.r > offset is outside.
+
+        A face is moved out to where no other surface is beyond it that may send a particle back, such as a floor.
+        """
+        there = [surface for surface in self.surfaces if surface.is_there(time)]
         faces = [
-            (*n, offset)
-            for surface in self.surfaces
+            (*n, max(offset, *(_end_of(one, n, time) for one in there)))
+            for surface in there
             for n, offset in planes_of(surface, surface.open_faces(), time)
-            if surface.is_there(time)
         ]
         rows = np.array(faces, dtype=np.float64).reshape(-1, 4)
         # Particles do not leave through a face across a direction in which the cell repeats.

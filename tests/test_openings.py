@@ -397,6 +397,49 @@ def test_open_faces_and_openings_add_up():
     assert np.isfinite(found.escape_time).tolist() == [False, True, False, False]
 
 
+def test_a_particle_above_a_floor_beyond_an_open_face_has_not_escaped():
+    """It comes back: no count of particles that have left may fall again."""
+    trough = swarm.Box((0.5, 0.5, 0.5), open=["-z"])
+    floor = swarm.Box((2.0, 2.0, 0.1), center=(0.0, 0.0, -1.1), side="outside")
+    scene = swarm.Scene([trough, floor], gravity=(0.0, 0.0, -10.0))
+    found = run(scene, thrown([(0, 0, 0), (0.1, 0, 0.3)], [(0, 0, 0), (0, 0, 0)]), until=2.0, frames=20)
+    assert found.observables["impacts"][-1] >= 4
+    assert not found.observables["escaped"].any()
+    assert scene.open_faces().tolist() == [[0.0, 0.0, -1.0, pytest.approx(1.2)]]
+
+
+SHAFT = swarm.Box((0.5, 0.5, 2.0), open=("+z",))
+
+
+@pytest.mark.parametrize(
+    ("other", "end"),
+    [
+        (swarm.Sphere(0.3, center=(0.0, 0.0, 5.0), side="outside"), 5.3),
+        (swarm.Spheres([[0.0, 0.0, 5.0], [0.0, 0.0, 3.0]], 0.3), 5.3),
+        (swarm.Boxes([[0.0, 0.0, 5.0], [0.0, 0.0, 3.0]], (0.1, 0.2, 0.3)), 5.3),
+        (swarm.Sphere(9.0), 9.0),
+        (swarm.Plane((0.0, 0.0, 1.0), 7.0), 7.0),
+        (swarm.Sphere(0.3, side="outside"), 2.0),
+        (swarm.Cylinder(0.2, side="outside"), 2.0),
+        (swarm.Sphere(0.3, center=(0.0, 0.0, 5.0), side="outside", present=[(0.0, 1.0)]), 2.0),
+        (swarm.Sphere(0.3, center=(0, 0, 5), side="outside", motion=swarm.Translation((0, 0, 1.0))), 7.3),
+    ],
+    ids=[
+        "a ball",
+        "balls",
+        "boxes",
+        "a cavity",
+        "a lid",
+        "a ball inside",
+        "an axle",
+        "a ball that went",
+        "one that moves",
+    ],
+)
+def test_an_open_face_ends_beyond_what_sends_particles_back(other, end):
+    assert swarm.Scene([SHAFT, other]).open_faces(2.0).tolist() == [[0.0, 0.0, 1.0, pytest.approx(end)]]
+
+
 def test_other_walls_may_move_over_what_has_escaped():
     piston = swarm.Plane((1.0, 0.0, 0.0), 0.5, motion=swarm.Translation((-0.2, 0.0, 0.0)))
     vessel = swarm.Box((0.5, 0.5, 0.5), openings=[swarm.Sphere(0.3, center=(0.2, 0.0, 0.5))])

@@ -53,9 +53,9 @@ def gradient_of(images: Sequence[Surface], points: NDArray[np.float64]) -> NDArr
     return np.asarray(gradients[worst, :, np.arange(points.shape[1])].T)
 
 
-def box_of(surface: Surface, time: float) -> Box:
-    """The bounds of a surface at a time [s]."""
-    low, high = (np.array(corner) for corner in surface.bounds())
+def box_of(surface: Surface, time: float, filled: bool = False) -> Box:
+    """The bounds of a surface at a time [s], or the box around what is `filled` by it, a solid too."""
+    low, high = (np.array(corner) for corner in (surface.enclosing_box() if filled else surface.bounds()))
     if surface.motion is not None:
         found = motions.pose(surface.motion, time)
         if np.array_equal(found.turn, np.eye(3)):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ... import motion as motions
+from ...common.once import once
 from ...common.rows import balls, bodies, directions, kept, lengths, widths
 from ...errors import SceneError
 from ...kernel.grid import one_cell
@@ -139,6 +140,7 @@ class Many(Surface):
     def wall_count(self, of_balls: bool) -> int:
         return len(self)
 
+    @once
     def enclosing_box(self) -> Box:
         low, high = self.corners()
         return tuple(low.min(axis=1).tolist()), tuple(high.max(axis=1).tolist())
