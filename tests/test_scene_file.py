@@ -228,7 +228,12 @@ def test_shipped_scenes_are_read(path):
         (
             "radius = 0.5",
             'radius = 0.5\nmotion = { kind = "translation", velocity = [0, 0, 1], speed = 1.0 }',
-            r"surface\[0\]\.motion\.speed: unknown key, expected 'velocity'",
+            r"surface\[0\]\.motion\.speed: unknown key, expected 'velocity'$",
+        ),
+        (
+            "radius = 0.5",
+            'radius = 0.5\nmotion = { kind = "rotation", axis = [0, 0, 1], rate = 1, most = 2 }',
+            r"surface\[0\]\.motion\.most: unknown key, expected 'axis', 'rate' and 'center'$",
         ),
         (
             "radius = 0.5",

@@ -9,7 +9,7 @@ import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, asdict, dataclass
+from dataclasses import MISSING, asdict, dataclass, fields
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -233,14 +233,10 @@ def _of_table(table: Mapping[str, Any], where: str) -> "WallMotion":
         raise SceneError(f"{where}.kind: expected one of {checks.listed(KINDS)}, got nothing")
     kind = checks.one_of(f"{where}.kind", table["kind"], KINDS)
     given = {key: part for key, part in table.items() if key != "kind"}
-    fields = KINDS[kind].__dataclass_fields__
-    for key in given:
-        if key not in fields:
-            raise SceneError(
-                f"{where}.{key}: unknown key, expected {checks.listed(fields)}{checks.closest(key, fields)}"
-            )
-    for name, field in fields.items():
-        if name not in given and field.default is MISSING:
+    needed = {one.name: one.default is MISSING for one in fields(KINDS[kind])}
+    checks.known_keys(f"{where}.", given, needed)
+    for name in needed:
+        if needed[name] and name not in given:
             raise SceneError(f"{where}.{name}: expected a value where kind is '{kind}', got nothing; add {name} = ...")
     try:
         return KINDS[kind](**given)  # type: ignore[no-any-return]
