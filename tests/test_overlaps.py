@@ -1,6 +1,7 @@
 """Cavities that overlap only in part: the run says that what they have in common is meant."""
 
 import logging
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -170,6 +171,17 @@ def test_walls_in_one_place_are_reported(name, caplog):
 @pytest.mark.parametrize("name", NOT_IN_ONE_PLACE)
 def test_other_walls_are_not(name, caplog):
     assert hints_of_walls(NOT_IN_ONE_PLACE[name], caplog) == []
+
+
+def test_lids_in_a_scene_of_two_dimensions_are_not_met(caplog):
+    """Boxes of one height have lids in one place, which no particle of the plane meets; sides may be in one place."""
+    low = swarm.Box((0.5, 0.1, 1.0), side="outside")
+    high = swarm.Box((0.5, 0.1, 1.0), center=(0.0, 0.15, 0.0), side="outside", restitution=0.5)
+    with caplog.at_level(logging.WARNING, "swarm"):
+        warn_of_walls_in_one_place(swarm.Scene([low, replace(high, half_widths=(0.4, 0.1, 1.0))], plane="z"), True)
+        assert not caplog.records
+        warn_of_walls_in_one_place(swarm.Scene([low, high], plane="z"), True)
+    assert "the laws of either" in caplog.text
 
 
 def test_balls_do_not_fit_into_a_gap_of_no_width(caplog):

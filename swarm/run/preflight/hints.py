@@ -252,7 +252,7 @@ def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
     from ...surfaces.presence import flush  # loaded where there are two walls
 
     bodies = list(itertools.islice(flush.bodies_of(scene.surfaces), flush.MOST_BODIES))
-    surfaces, size = [one.body for one in bodies], scene.extent() or 1.0
+    surfaces, size, across = [one.body for one in bodies], scene.extent() or 1.0, scene.across()
 
     def matters(one: Surface, other: Surface, are_back_to_back: bool) -> bool:
         return of_points and (one.is_solid() or other.is_solid()) if are_back_to_back else _differ(one, other)
@@ -261,7 +261,11 @@ def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
     reaching = [k for k, one in enumerate(bodies) if flush.may_reach(one, scene.surfaces)] if of_points else []
     closed = {(reaching[i], face) for i, face in flush.flush_faces([surfaces[k] for k in reaching])}
     for pair in flush.pairs_in_one_place(surfaces, size, matters):
-        if not any(end in closed for end in zip(pair.surfaces, pair.faces, strict=True)):
+        ends = list(zip(pair.surfaces, pair.faces, strict=True))
+        plane = flush.face_of(surfaces[pair.surfaces[0]], pair.faces[0]).plane
+        # No particle meets the lids of boxes in a scene of two dimensions.
+        is_lid = across is not None and plane is not None and abs(plane[0][across]) > 0.5
+        if not is_lid and not any(end in closed for end in ends):
             words = _ONLY_TOUCH if pair.are_back_to_back else _IN_ONE_PLACE
             _LOG.warning(words, *(_named(scene.surfaces, *bodies[k][:2]) for k in pair.surfaces))
             return
