@@ -1,5 +1,6 @@
 """Compilation: the same definitions in Python and in kernels, and a cache that notices edits."""
 
+import ast
 import functools
 import math
 import os
@@ -8,6 +9,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import llvmlite.binding as llvm
@@ -21,7 +23,7 @@ from numba.core.errors import TypingError
 
 import swarm
 from swarm.compiled_scene import MOST_WALLS
-from swarm.kernel import arrays, cache, lines, machine_code
+from swarm.kernel import arrays, cache, compiling, lines, machine_code
 from swarm.kernel import jit as _jit
 from swarm.kernel.arrays import kept
 from swarm.kernel.compilers import _DEEPEST, deep, features_of
@@ -519,6 +521,18 @@ def one_more(x):
 
 
 @compiled_only
+def test_every_kernel_that_a_run_compiles_has_a_name_in_words():
+    """What `calls` of the engines yield is named on the terminal while it is compiled."""
+    named = set()
+    for path in PACKAGE.rglob("*.py"):
+        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(function, ast.FunctionDef) and function.name == "calls":
+                given = [one.value for one in ast.walk(function) if isinstance(one, ast.Yield)]
+                named |= {ast.unparse(one.elts[0]).rpartition(".")[2] for one in given if isinstance(one, ast.Tuple)}
+    assert len(named) > 15
+    assert {name for name in named if compiling.sentence_of(SimpleNamespace(__name__=name)).split()[3] != "of"} == set()
+
+
 def test_compilations_are_reported_and_cached_kernels_are_not(tmp_path, monkeypatch, caplog):
     monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     sentences = []
