@@ -226,8 +226,8 @@ def _time(task: Task) -> dict[str, str]:
     compiling = _COMPILING if task.bodies is None else _COMPILING_BODIES
     work = " and ".join(f"{many(float(f'{one.events:.2g}'))} {one.noun}" for one in loads)
     stated = {"work": f"about {work}"} if work else {}
-    missing, kernels = _kernels(task)
-    is_plain = missing > 0 and python < _BEGINNING + _IN_PYTHON and options.compile != "always"
+    missing, kernels, begins_plain = _kernels(task)
+    is_plain = begins_plain and python < _BEGINNING + _IN_PYTHON
     # Balls that settle meet one another and walls far more often, how often the start does not show.
     more = ", and more where balls settle" if task.particles.radius is not None and _settles(task) else ""
     if options.compile == "never" or is_plain:
@@ -361,10 +361,13 @@ def _cost_of_an_impact(task: Task) -> float:
     return each * max(1, len(walls.each))
 
 
-def _kernels(task: Task) -> tuple[int, int]:
-    """How many kernels are not compiled yet, and how many the run is known to need; (0, 0): too many to look."""
+def _kernels(task: Task) -> tuple[int, int, bool]:
+    """How many kernels are not compiled yet, how many the run is known to need, and whether it does without at first.
+
+    (0, 0, False): there are too many particles to look.
+    """
     if len(task.particles) > _MOST:
-        return 0, 0
+        return 0, 0, False
     with run_of(task) as run:
         calls = list(run.calls())
-    return sum(not cache.is_compiled(*call) for call in calls), len(calls)
+        return sum(not cache.is_compiled(*call) for call in calls), len(calls), run.is_plain()

@@ -387,6 +387,10 @@ class BaseRun:
         """The log of the calling thread, for the frame that ends at a time [s]; None in a run without a log."""
         return None if self._impacts is None else ThreadLog(self._impacts, end)
 
+    def is_plain(self) -> bool:
+        """Whether its kernels are run in plain Python at first."""
+        return self._tier.is_plain
+
     def _choose_tier(self) -> None:
         """Take the tier of the next calls."""
         self._tier.choose(self.calls())

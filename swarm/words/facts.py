@@ -200,14 +200,14 @@ def _of_space(scene: Scene) -> list[Statement]:
 
 def of_counters(counters: Sequence[Any], crossings: Any) -> list[Statement]:
     """The counters of a run, as far as known, and how many particles crossed each; [] for a run without counters."""
-    stated = []
-    for k, (out, back) in enumerate(np.asarray(crossings).tolist()):
-        described = ""
+    crossed, stated = [f"{many(out)} out, {many(back)} back" for out, back in np.asarray(crossings).tolist()], []
+    for k in range(max(len(counters), len(crossed))):
+        parts = crossed[k : k + 1]
         if k < len(counters):
             within = counters[k].inside
-            described = nouns.in_full(counters[k].surface)
-            described += "; " if within is None else f", within {nouns.in_full(within)}; "
-        stated.append(Statement(f"counter {k}", f"{described}{many(out)} out, {many(back)} back"))
+            parts.insert(0, nouns.in_full(counters[k].surface))
+            parts[0] += "" if within is None else f", within {nouns.in_full(within)}"
+        stated.append(Statement(f"counter {k}", "; ".join(parts)))
     return stated
 
 

@@ -16,6 +16,7 @@ from swarm import scene_file
 from swarm.authoring import outlook
 from swarm.authoring.starters import KINDS, text_of
 from swarm.files.writer import size_of
+from swarm.kernel import cache
 from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of
 
@@ -63,6 +64,19 @@ def test_a_sweep_takes_what_its_runs_take(tmp_path):
     ]
     assert sizes[0] == pytest.approx(3.0 * (sizes[2] + sizes[3]), rel=0.01)
     assert sizes[1] == pytest.approx(30.0 * sizes[3], rel=0.01)
+
+
+def test_what_begins_in_plain_python_is_what_the_run_begins_so(tmp_path, monkeypatch):
+    """A run of more than 2000 particles compiles what is missing at once, however few impacts there are."""
+    monkeypatch.setattr(cache, "is_compiled", lambda *call: False)
+    few, more = (looked(tmp_path, GOOD.replace("count = 10", f"count = {n}"))["time"] for n in (2000, 2001))
+    assert "in plain Python" in few
+    assert "to compile 2 of 2 kernels" in more
+
+
+def test_counters_are_among_what_the_run_has(tmp_path):
+    rows = looked(tmp_path, GOOD + '[[counter]]\nsurface = { kind = "plane", normal = [1, 0, 0], offset = 0.1 }\n')
+    assert rows["counter 0"] == "a plane of offset 0.1 m, normal along x"
 
 
 def test_the_command(tmp_path):
