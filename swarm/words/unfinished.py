@@ -1,5 +1,8 @@
 """Whether the run of a trajectory has come to its end, and how it goes on."""
 
+import contextlib
+import itertools
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..files import paths
@@ -8,6 +11,8 @@ from .amounts import amount
 
 # A frame at the end of a run is there to round-off.
 _ROUND_OFF = 1e-9
+# So many scene files of a folder are looked at for that of a run.
+_LOOKED_AT = 1000
 
 
 class Note(NamedTuple):
@@ -37,7 +42,18 @@ def unfinished(trajectory: Any) -> Note | None:
         return Note(f"{text} There is no checkpoint beside it to go on from.")
     if trajectory.scene_text is None:
         return Note(f"{text} Go on with it by the script that began it, with resume=True.")
-    return Note(f"{text} Go on with it:", f"swarm run {trajectory.path.stem}.toml -o {trajectory.path.name} --resume")
+    scene = _scene_file_beside(trajectory.path, trajectory.scene_text)
+    by = "" if scene else " by its scene file"
+    return Note(f"{text} Go on with it{by}:", f"swarm run {scene or 'SCENE.toml'} -o {trajectory.path.name} --resume")
+
+
+def _scene_file_beside(path: Path, text: str) -> str | None:
+    """The name of the scene file with this text in the folder of a trajectory."""
+    for one in itertools.islice(sorted(path.parent.glob("*.toml"), key=lambda one: one.stem != path.stem), _LOOKED_AT):
+        with contextlib.suppress(OSError):
+            if one.read_text(encoding="utf-8-sig", errors="replace") == text:
+                return one.name
+    return None
 
 
 def _until_of(text: str) -> float | None:

@@ -249,7 +249,7 @@ def test_what_cannot_be_reproduced_is_reported(options, reason, tmp_path, words)
 # --- Runs of all kinds -----------------------------------------------------------------------------------
 
 
-def cut(path):
+def cut(path, **options):
     """A run that was stopped after three frames."""
 
     def stop(frame):
@@ -257,7 +257,7 @@ def cut(path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(path, progress=stop)
+        run(path, progress=stop, **options)
 
 
 def test_a_run_that_was_cut_says_so(tmp_path, words):
@@ -272,6 +272,17 @@ def test_a_run_that_was_cut_says_so(tmp_path, words):
     assert (next(iter(rows)), rows["state"]) == ("state", sentence)
     run(tmp_path / "whole.h5")
     assert "state" not in summary.of_file(tmp_path / "whole.h5")
+
+
+def test_a_run_that_was_cut_names_its_own_scene_file(tmp_path):
+    """Whatever the names of both; SCENE.toml stands for one that is not there."""
+    path, text = tmp_path / "job_7.h5", "[run]\nuntil = 1.0\n"
+    cut(path, scene_text=text)
+    (tmp_path / "job_7.h5.checkpoint").touch()
+    (tmp_path / "job_7.toml").write_text("[run]\nuntil = 2.0\n")
+    assert summary.of_file(path)["state"].endswith("by its scene file: swarm run SCENE.toml -o job_7.h5 --resume")
+    (tmp_path / "gas.toml").write_text(text)
+    assert summary.of_file(path)["state"].endswith("Go on with it: swarm run gas.toml -o job_7.h5 --resume")
 
 
 def test_a_run_that_goes_on_says_so(folder, words):
