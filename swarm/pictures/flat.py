@@ -23,6 +23,8 @@ _ROOM = 0.02
 _SAME = 2e-3
 # An opening is at most this part of the length of the wall around it.
 _OPEN = 0.34
+# Steps between labels on the longer side.
+_TICKS = 5
 
 
 def ends_in_plane(across: int, found: list[Floats]) -> tuple[Floats, Floats]:
@@ -62,8 +64,10 @@ def flat(
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     at = shown_as(across, points)
     say_beyond(axes, int(((at < low) | (at > high)).any(axis=1).sum()))
-    for axis, k in zip((axes.xaxis, axes.yaxis), along(across), strict=True):
-        axis.set_major_locator(MaxNLocator(5, min_n_ticks=2))
+    parts = (high - low) / (high - low).max()
+    for axis, k, part in zip((axes.xaxis, axes.yaxis), along(across), parts.tolist(), strict=True):
+        # A narrow picture has room for few labels below it.
+        axis.set_major_locator(MaxNLocator(max(1, round(_TICKS * part)), min_n_ticks=2))
         axis.set_tick_params(colors=INK, labelsize=8)
         axis.set_label_text(f"{'xyz'[k]} [m]", fontsize=9, color=INK)
     axes.grid(False)

@@ -10,6 +10,7 @@ from ..state import Floats
 from ..surfaces.instant import box_of
 from ..surfaces.plane import along
 from ..surfaces.presence.openings import are_open
+from ..surfaces.room import polyhedron_bounds
 from ..surfaces.rotation import normalized
 from ..surfaces.surface import Surface
 from .curves import runs
@@ -39,7 +40,8 @@ class PlaneWalls:
         assert across is not None
         self._scene, self._time, self._across, self._axes = scene, time, across, along(across)
         low, high = (np.array(corner)[list(self._axes)] for corner in scene.bounds(time))
-        reach = _BEYOND * max(scene.extent(), float(np.abs(positions).max()))
+        wide = max((_extent(surface, self._axes) for surface in scene.surfaces), default=0.0) or scene.extent()
+        reach = _BEYOND * max(wide, float(np.abs(positions).max()))
         low, high = np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
         margin = _MARGIN * (high - low) / (_POINTS - 1.0)
         self._box: Corners = low - margin, high + margin
@@ -182,3 +184,12 @@ def _end(level: Level, within: Floats, beyond: Floats) -> Floats:
         else:
             beyond = middle
     return within
+
+
+def _extent(surface: Surface, axes: tuple[int, int]) -> float:
+    """The distance from the origin within which a surface lies in the plane, up to the faces that it has not."""
+    box = np.array(surface.enclosing_box())
+    if faces := surface.open_faces():
+        box = np.array(polyhedron_bounds(faces, *box))
+    corners = np.abs(box[:, list(axes)])
+    return float(corners.max()) if np.isfinite(corners).all() else surface.extent()

@@ -1,5 +1,6 @@
 """Particles among their walls: what solids hide, silhouettes, levels, and how much of a panel a vessel fills."""
 
+import itertools
 import math
 
 import numpy as np
@@ -261,6 +262,31 @@ def test_what_is_open_far_and_wide_is_not_filled():
     two_walls = [np.array([[0.0, 0.0], [3.0, 0.0]]), np.array([[0.0, 1.0], [3.0, 1.0]])]
     (loop,) = flat._loops(two_walls, 1e-3, 0.34)
     assert area(loop) == pytest.approx(3.0)
+
+
+def shaft(height):
+    """A narrow one between blocks, open at both ends, of solids so high across its plane."""
+    blocks = [swarm.Box((0.05, 0.01, height), center=(x, -0.01, 0.0), side="outside") for x in (-0.07, 0.07)]
+    return swarm.Scene([swarm.Box((0.1, 0.3, height), center=(0, 0.3, 0), open=["+y", "-y"]), *blocks], plane="z")
+
+
+def test_heights_across_its_plane_do_not_widen_a_picture():
+    low, high = (np.concatenate([c for one in shapes_of(shaft(h), NOWHERE) for c in one.edges]) for h in (0.01, 5.0))
+    assert np.array_equal(low, high)
+    assert abs(low[:, 1]).max() < 1.3 * 0.6
+
+
+def test_labels_below_a_narrow_picture_are_beside_one_another():
+    figure = style.picture(2.0, 6.0)
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    flat.flat(axes, 2, np.array([[0.0, 0.1, 0.0]]), "red", shapes_of(shaft(1.0), NOWHERE))
+    figure.canvas.draw()
+    for axis, side in ((axes.xaxis, "x"), (axes.yaxis, "y")):
+        boxes = [label.get_window_extent() for label in axis.get_ticklabels() if label.get_visible()]
+        ends = sorted((getattr(one, f"{side}0"), getattr(one, f"{side}1")) for one in boxes)
+        assert len(ends) >= 2
+        assert all(a[1] < b[0] for a, b in itertools.pairwise(ends))
 
 
 def test_in_an_open_plane_a_far_particle_is_counted():
