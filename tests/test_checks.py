@@ -109,6 +109,11 @@ def test_listed(names, text):
 def test_closest():
     assert checks.closest("raduis", ["radius", "center"]) == "; did you mean 'radius'?"
     assert checks.closest("zzz", ["radius", "center"]) == ""
+    # A word of other programs is more than a similar one, and words that share a few letters are not similar.
+    assert checks.closest("COR", ["center", "restitution"]) == "; did you mean 'restitution'?"
+    assert checks.closest("t_end", ["threads", "until"]) == "; did you mean 'until'?"
+    assert checks.closest("t_end", ["threads"]) == checks.closest("material", ["inertia"]) == ""
+    assert checks.closest("coefficient_of_restitution", ["rotation", "restitution"]) == "; did you mean 'restitution'?"
 
 
 @pytest.mark.parametrize(

@@ -190,6 +190,8 @@ def test_shipped_scenes_are_read(path):
             r"method\.exponent must be 1 or more, got 0\.9",
         ),
         ("until = 1.0", "", r"run\.until: expected a number, got nothing"),
+        ("until = 1.0", "until = 1.0\ndt = 2", r"run\.dt: unknown key.*; dt is a key of \[method\]$"),
+        ("speed = 0.5", "speed = 0.5\ndensity = 2", r"particles\.density: unknown key.*; give the mass of each \[kg\]"),
         ("until = 1.0", "until = 1.0\nevry = 2", r"run\.evry: unknown key.*did you mean 'every'"),
         ("every = 0.5", "every = 2.0", r"run\.every must be at most until = 1, got 2"),
         ("every = 0.5", "threads = 0", r"run\.threads must be 1 or more, got 0"),

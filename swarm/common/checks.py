@@ -28,6 +28,34 @@ _DOUBLE = 8
 _SHOWN = 200
 # The beginning of a sentence about an argument, or about a part of it.
 _ARGUMENT = re.compile(r"[a-z_]\w*(\[\d+\])*(\.[a-z_]\w*(\[\d+\])*)*( must | has | is |: )")
+# The part of two names that is alike where one is taken for the other.
+_SIMILAR = 0.54
+# What names of arguments and kinds are called elsewhere.
+_OTHER_WORDS = {
+    "friction": "mu mu_s mu_d cof",
+    "restitution": "e cor eps bounce",
+    "count": "n num number",
+    "n": "count num number",
+    "until": "t_end tend t_max tmax t_final duration end time steps n_steps",
+    "every": "interval save_every output_every dt_out",
+    "radius": "r d diameter",
+    "speed": "v v0 velocity",
+    "temperature": "t temp kt",
+    "penalty": "k kn k_n stiffness dem spring soft-sphere",
+    "rate": "omega angular_velocity frequency",
+    "center": "position pos origin centre",
+    "half_widths": "size sides lengths half_lengths extents",
+    "trajectory": "output out",
+    "impact": "event-driven edmd hard-sphere elastic",
+    "lambert": "diffuse cosine",
+    "sphere": "ball circle disc disk",
+    "box": "cube cuboid brick rectangle square",
+    "cylinder": "tube pipe",
+    "plane": "wall floor",
+    "inside": "in internal",
+    "outside": "out external",
+    "mesh": "stl",
+}
 _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
@@ -315,8 +343,14 @@ def one_of(name: str, value: Any, choices: Iterable[str]) -> str:
 
 
 def closest(value: Any, known: Iterable[str]) -> str:
-    """The hint "; did you mean ...?" with the most similar name, or an empty text."""
-    found = difflib.get_close_matches(value if isinstance(value, str) else shown(value), list(known), n=1, cutoff=0.5)
+    """The hint "; did you mean ...?" with the name of the same meaning, or the most similar one, or an empty text.
+
+    >>> closest("mu", ("restitution", "friction")), closest("raduis", ("radius", "center")), closest("x", ("radius",))
+    ("; did you mean 'friction'?", "; did you mean 'radius'?", '')
+    """
+    text, names = value if isinstance(value, str) else shown(value), list(known)
+    found = [name for name in names if text.lower() in _OTHER_WORDS.get(name, "").split()]
+    found += difflib.get_close_matches(text, names, n=1, cutoff=_SIMILAR)
     return f"; did you mean {found[0]!r}?" if found else ""
 
 

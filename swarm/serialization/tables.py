@@ -40,6 +40,8 @@ _WORDS = {
 _ELSEWHERE = {
     **{key: f"; {key} belongs at the top, before the first table" for key in ("gravity", "period", "plane")},
     **dict.fromkeys(("position", "velocity"), '; places and velocities are in a file: from = "start.csv"'),
+    "density": "; give the mass of each [kg] in its place",
+    **{key: f"; {key} is a key of [method]" for key in ("dt", "penalty")},
 }
 # An array of more numbers is not written as text: HDF5 loses texts of 100 MB, and a million balls take 10 s to write.
 _LONG, _ARRAY = 1000, "sha256:"
