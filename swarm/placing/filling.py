@@ -28,7 +28,7 @@ _POINTS = 1 << 18
 # How many of these tell whether balls are few, so many standard deviations from where it would be another answer; and
 # how many are looked at together.
 _SOME, _CERTAIN, _AT_ONCE = 1 << 15, 7.0, 1 << 14
-_INSTEAD = "the particles as arrays or a CSV file"
+_INSTEAD = "the particles as arrays, a CSV file or a source with a volume"
 
 
 def fill(
