@@ -66,8 +66,9 @@ def flat(
     say_beyond(axes, int(((at < low) | (at > high)).any(axis=1).sum()))
     parts = (high - low) / (high - low).max()
     for axis, k, part in zip((axes.xaxis, axes.yaxis), along(across), parts.tolist(), strict=True):
-        # A narrow picture has room for few labels below it.
-        axis.set_major_locator(MaxNLocator(max(1, round(_TICKS * part)), min_n_ticks=2))
+        # A narrow picture has room for few labels below it: the other axis shows the scale.
+        steps = max(1, round(_TICKS * part))
+        axis.set_major_locator(MaxNLocator(steps, min_n_ticks=min(steps, 2)))
         axis.set_tick_params(colors=INK, labelsize=8)
         axis.set_label_text(f"{'xyz'[k]} [m]", fontsize=9, color=INK)
     axes.grid(False)

@@ -276,8 +276,9 @@ def test_heights_across_its_plane_do_not_widen_a_picture():
     assert abs(low[:, 1]).max() < 1.3 * 0.6
 
 
-def test_labels_below_a_narrow_picture_are_beside_one_another():
-    figure = style.picture(2.0, 6.0)
+@pytest.mark.parametrize("size", [(2.0, 6.0), (2.0, 3.0)])
+def test_labels_below_a_narrow_picture_are_beside_one_another(size):
+    figure = style.picture(*size)
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     flat.flat(axes, 2, np.array([[0.0, 0.1, 0.0]]), "red", shapes_of(shaft(1.0), NOWHERE))
@@ -285,7 +286,7 @@ def test_labels_below_a_narrow_picture_are_beside_one_another():
     for axis, side in ((axes.xaxis, "x"), (axes.yaxis, "y")):
         boxes = [label.get_window_extent() for label in axis.get_ticklabels() if label.get_visible()]
         ends = sorted((getattr(one, f"{side}0"), getattr(one, f"{side}1")) for one in boxes)
-        assert len(ends) >= 2
+        assert len(ends) >= (2 if side == "y" else 1)
         assert all(a[1] < b[0] for a, b in itertools.pairwise(ends))
 
 
