@@ -16,6 +16,8 @@ _ALIKE = 1e-9
 _NEAR = 0.1
 # A histogram with more than this part in one bin says nothing.
 _ALL = 0.8
+# Room above a histogram for each row of the legend, as a part of its height.
+_ROW = 0.16
 Spread = dict[str, Floats]
 
 
@@ -81,7 +83,7 @@ def draw(axes: Any, content: Any, spread: Spread) -> None:
         axes.stairs(100.0 * counts / len(values), edges * factor, color=colour, label=when, **look)
     _law(axes, content, spread, top / bins, factor)
     axes.set_xlim(0.0, top * factor)
-    axes.set_ylim(0.0, 1.35 * axes.get_ylim()[1])
+    axes.set_ylim(0.0, (1.1 + _ROW * len(axes.get_legend_handles_labels()[0])) * axes.get_ylim()[1])
     axes.set_title("Speeds" if content.body is None else "Speeds of points")
     axes.set_ylabel(f"% in each of {bins} bins")
     axes.set_xlabel(f"speed [{unit}]")

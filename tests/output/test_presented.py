@@ -113,6 +113,21 @@ def test_a_figure_of_a_result_without_a_trajectory():
             result.plot(**wrong)
 
 
+def test_the_legend_of_the_speeds_is_above_them(tmp_path):
+    """Also in the lowest panel that there is: of a run with counters, with three rows, in a vessel of two parts."""
+    vessel = swarm.Scene([swarm.Union([swarm.Sphere(0.5, temperature=1.0), swarm.Sphere(0.5, (0.6, 0, 0))])])
+    swarm.simulate(
+        vessel, swarm.fill(vessel, 300, temperature=1.0, seed=1), until=0.1, every=0.05,
+        counters=[swarm.Plane((1.0, 0.0, 0.0))], trajectory=tmp_path / "gas.h5", compile="never",
+    )  # fmt: skip
+    with swarm.load(tmp_path / "gas.h5") as trajectory:
+        figure = trajectory.plot()
+    figure.canvas.draw()
+    (axes,) = (one for one in figure.axes if one.get_title() == "Speeds")
+    assert len(axes.get_legend().get_texts()) == 3
+    assert axes.get_legend().get_window_extent().y0 > max(bars.get_window_extent().y1 for bars in axes.patches)
+
+
 @pytest.mark.parametrize("frames", ["none", 3])
 def test_a_figure_of_a_file_without_all_particles(frames, tmp_path):
     """It says how many of how many particles are drawn; without any there are the time series."""
