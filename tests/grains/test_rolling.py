@@ -131,3 +131,21 @@ def test_where_nothing_rolls_it_is_refused(method, radius, sentence):
     one = swarm.Particles([[0.0], [0.0], [0.1]], np.zeros((3, 1)), MASS, radius=radius, spin=spin)
     with pytest.raises(swarm.SceneError, match=sentence):
         swarm.simulate(floor(0.1), one, method, until=0.1)
+
+
+@pytest.mark.slow
+def test_a_ball_on_a_turntable_rolls_on_a_circle():
+    """A solid ball that does not slip on a disc that turns at W moves on a circle at 2/7 W, wherever it starts."""
+    rate, radius, mass, penalty, speed = 4.0, 0.01, 0.01, 1e4, 0.2
+    disc = swarm.Plane((0.0, 0.0, -1.0), friction=1.0, motion=swarm.Rotation((0.0, 0.0, 1.0), rate=rate))
+    scene = swarm.Scene([disc], gravity=(0.0, 0.0, -9.81))
+    # The contact moves with the disc: v + w x (-R e_z) = (0, 0.3 W, 0).
+    spin = [[(0.3 * rate - speed) / radius], [0.0], [0.0]]
+    height = radius - mass * 9.81 / penalty
+    ball = swarm.Particles([[0.3], [0.0], [height]], [[0.0], [speed], [0.0]], mass=mass, radius=radius, spin=spin)
+    turned = 2.0 / 7.0 * rate * 1.0
+    end = swarm.simulate(scene, ball, swarm.Penalty(dt=1e-4, penalty=penalty), until=1.0).particles
+    assert end.velocity[:2, 0] == pytest.approx([-speed * math.sin(turned), speed * math.cos(turned)], abs=1e-6 * speed)
+    circle = speed / (2.0 / 7.0 * rate)
+    place = [0.3 - circle + circle * math.cos(turned), circle * math.sin(turned)]
+    assert end.position[:2, 0] == pytest.approx(place, abs=2e-5 * circle)
