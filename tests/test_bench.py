@@ -45,18 +45,70 @@ def printed(monkeypatch, capsys):
     return of
 
 
-def test_throughput_quick(printed):
-    table = printed("throughput")
-    for row in (
-        "bare loop in C, sphere",
-        "limit: a square root",
-        "1 thread, output: HDF5+Rerun",
-        "2 threads, output: HDF5 ",
-        "2 threads, output: none",
-        "Impact, sphere",
-        "Penalty, dt=0.025, sphere",
-    ):
-        assert row in table
+def at(pattern):
+    """A line that begins so."""
+    return re.compile("^" + pattern, re.MULTILINE)
+
+
+# Of each command: texts of its table, and what its lines match.
+TABLES = {
+    "accuracy": (
+        "sphere: Choose Impact",
+        "distance <= 1e-06 (bar: Impact takes 1/1000 of plain Verlet in Numba): ",
+    ),
+    "bars": (
+        "Impact, sphere ", "two threads over one", "Penalty, sphere, dt=0.025", "Uzawa, State I", "memory",
+        "first frame",
+    ),
+    "bodies": ("chain of ten, a step, two threads", "tetrahedron in a sphere, link error"),
+    "cluster": ("two workers of one thread",),
+    "collisions": (
+        "8788 balls, packing 0.4, box, a collision", "momentum along the cell", "overlap at 5 frames",
+        "ball in a formula, an event", "ball in a formula over one in a box",
+    ),
+    "contacts": (
+        "cone with a lid", "hopper, friction 0.4", "mass ratio 100^2", "composed step, ellipsoid, 2 threads",
+    ),
+    "endurance": ("checkpoint of 1000 particles", "memory grown", "a particle's path"),
+    "fields": ("27 balls, an impact", "  the plain loop", "1000 balls, an impact", "  particles in a ball"),
+    "grains": ("Hertz, gap after the contact", "8 rough, mu = 0.5 grains that fall", "  at rest, a grain and step"),
+    "laws": ("Lambert, an impact", "user-defined Lambert, an impact", "energy that no book has"),
+    "meshes": ("triangles",),
+    "motion": (
+        "piston, T V^(2/3) - 1", "heavy piston, impacts", "Galperin, 100^2 kg", "box oscillating, an impact",
+    ),
+    "order": (at("sphere +Impact, centred .* exact "), at(r"torus +AugmentedLagrangian, centred .* [12]\.\d+ ")),
+    "pairs": (at(r"points, Impact +2 +0 +0 +100%"), at("gravity +x$")),
+    "plane": ("circle", "stadium"),
+    "scenes": ("capped cylinder", "formula of the ellipsoid"),
+    "stability": (
+        "stiffness: Penalty: energy within 1e-12 in 3 of 3 cells",
+        "uzawa: State I with exponent 1: 1 of 1 converge",
+        "tunnelling: Penalty: 0 % of the particles pass the wall at most; refused from 5.7 thicknesses a step",
+        "tunnelling: plain Verlet: 5",
+        "grazing: Impact, angles down to 1e-12 rad: energy within",
+        "roundoff: Impact, sphere: worst energy error",
+    ),
+    "sweep": ("compile once", "swarm sweep, nothing compiled before", "memory of a worker, at the end"),
+    "throughput": (
+        "bare loop in C, sphere", "limit: a square root", "1 thread, output: HDF5+Rerun", "2 threads, output: HDF5 ",
+        "2 threads, output: none", "Impact, sphere", "Penalty, dt=0.025, sphere",
+    ),
+    "unions": ("two balls, an impact", "a box, a tube, a box under gravity, an impact"),
+}  # fmt: skip
+# They compile kernels that no other test needs.
+ALONE = {
+    "bodies", "cluster", "collisions", "contacts", "fields", "grains", "laws", "meshes", "motion", "sweep", "unions",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in ALONE else name for name in TABLES]
+)
+def test_the_table_of_a_command(printed, name):
+    table = printed(name)
+    for line in TABLES[name]:
+        assert line in table if isinstance(line, str) else line.search(table), line
 
 
 def test_peers_quick(printed):
@@ -66,98 +118,6 @@ def test_peers_quick(printed):
         assert f"{peer} is left out: " in table or peer in table.lower()
     assert "swarm, Penalty: alpha=1e4, dt=1e-3" in table
     assert "plain Verlet in Numba" in table
-
-
-def test_bars_quick(printed):
-    table = printed("bars")
-    for row in (
-        "Impact, sphere ",
-        "two threads over one",
-        "Penalty, sphere, dt=0.025",
-        "Uzawa, State I",
-        "memory",
-        "first frame",
-    ):
-        assert row in table
-
-
-def test_order_quick(printed):
-    table = printed("order")
-    assert re.search(r"^sphere +Impact, centred .* exact ", table, re.MULTILINE)
-    assert re.search(r"^torus +AugmentedLagrangian, centred .* [12]\.\d+ ", table, re.MULTILINE)
-
-
-def test_scenes_quick(printed):
-    table = printed("scenes")
-    assert "capped cylinder" in table
-    assert "formula of the ellipsoid" in table
-
-
-def test_plane_quick(printed):
-    table = printed("plane")
-    assert "circle" in table
-    assert "stadium" in table
-
-
-@pytest.mark.slow
-def test_contacts_quick(printed):
-    table = printed("contacts")
-    for row in ("cone with a lid", "hopper, friction 0.4", "mass ratio 100^2", "composed step, ellipsoid, 2 threads"):
-        assert row in table
-
-
-@pytest.mark.slow
-def test_bodies_quick(printed):
-    table = printed("bodies")
-    for row in ("chain of ten, a step, two threads", "tetrahedron in a sphere, link error"):
-        assert row in table
-
-
-def test_accuracy_quick(printed):
-    table = printed("accuracy")
-    assert "sphere: Choose Impact" in table
-    assert "distance <= 1e-06 (bar: Impact takes 1/1000 of plain Verlet in Numba): " in table
-
-
-def test_stability_quick(printed):
-    table = printed("stability")
-    assert "stiffness: Penalty: energy within 1e-12 in 3 of 3 cells" in table
-    assert "uzawa: State I with exponent 1: 1 of 1 converge" in table
-    assert (
-        "tunnelling: Penalty: 0 % of the particles pass the wall at most; refused from 5.7 thicknesses a step" in table
-    )
-    assert "tunnelling: plain Verlet: 5" in table
-    assert "grazing: Impact, angles down to 1e-12 rad: energy within" in table
-    assert "roundoff: Impact, sphere: worst energy error" in table
-
-
-def test_endurance_quick(printed):
-    table = printed("endurance")
-    for row in ("checkpoint of 1000 particles", "memory grown", "a particle's path"):
-        assert row in table
-
-
-@pytest.mark.slow
-def test_grains_quick(printed):
-    table = printed("grains")
-    for row in ("Hertz, gap after the contact", "8 rough, mu = 0.5 grains that fall", "  at rest, a grain and step"):
-        assert row in table
-
-
-@pytest.mark.slow
-def test_meshes_quick(printed):
-    assert "triangles" in printed("meshes")
-
-
-@pytest.mark.slow
-def test_cluster_quick(printed):
-    assert "two workers of one thread" in printed("cluster")
-
-
-def test_pairs_quick(printed):
-    table = printed("pairs")
-    assert re.search(r"^points, Impact +2 +0 +0 +100%", table, re.MULTILINE)
-    assert re.search(r"^gravity +x$", table, re.MULTILINE)
 
 
 def test_reference_quick(capsys):
@@ -171,9 +131,9 @@ WITHOUT_QUICK = {"compare", "faults"}
 
 def test_every_command_of_the_readme_runs():
     listed = re.findall(r"^\| `python -m bench[ .](\w+)", (ROOT / "bench" / "README.md").read_text(), re.MULTILINE)
-    tested = {name.removeprefix("test_").removesuffix("_quick") for name in globals() if name.endswith("_quick")}
+    alone = {name.removeprefix("test_").removesuffix("_quick") for name in globals() if name.endswith("_quick")}
     assert len(listed) > 20
-    assert set(listed) == tested | WITHOUT_QUICK
+    assert set(listed) == alone | set(TABLES) | WITHOUT_QUICK
 
 
 def table(path, **rows):
@@ -225,49 +185,6 @@ def test_what_others_took_is_reported(monkeypatch):
     assert report.told_of_others((100, 1000)).split(" of the time")[0].endswith("took 15 %")
     monkeypatch.setattr(report, "stolen", lambda: (100, 1000))
     assert "an unknown part" in report.told_of_others((100, 1000))
-
-
-@pytest.mark.slow
-def test_motion_quick(printed):
-    table = printed("motion")
-    for row in ("piston, T V^(2/3) - 1", "heavy piston, impacts", "Galperin, 100^2 kg", "box oscillating, an impact"):
-        assert row in table
-
-
-@pytest.mark.slow
-def test_fields_quick(printed):
-    table = printed("fields")
-    for row in ("27 balls, an impact", "  the plain loop", "1000 balls, an impact", "  particles in a ball"):
-        assert row in table
-
-
-@pytest.mark.slow
-def test_laws_quick(printed):
-    table = printed("laws")
-    for row in ("Lambert, an impact", "user-defined Lambert, an impact", "energy that no book has"):
-        assert row in table
-
-
-@pytest.mark.slow
-def test_collisions_quick(printed):
-    table = printed("collisions")
-    rows = ("8788 balls, packing 0.4, box, a collision", "momentum along the cell", "overlap at 5 frames")
-    for row in (*rows, "ball in a formula, an event", "ball in a formula over one in a box"):
-        assert row in table
-
-
-@pytest.mark.slow
-def test_unions_quick(printed):
-    table = printed("unions")
-    for row in ("two balls, an impact", "a box, a tube, a box under gravity, an impact"):
-        assert row in table
-
-
-@pytest.mark.slow
-def test_sweep_quick(printed):
-    table = printed("sweep")
-    for row in ("compile once", "swarm sweep, nothing compiled before", "memory of a worker, at the end"):
-        assert row in table
 
 
 def test_compile_quick(printed):
