@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from conftest import rarely
+from same_bits import require_same
 from test_sessions import stopped_at
 
 import swarm
@@ -64,14 +65,6 @@ def one(position, velocity):
 
 def counted(scene, counters, start, until, **keywords):
     return run(scene, counters, start=start, until=until, **keywords)[1].observables["crossings"][-1].tolist()
-
-
-def require_same(result, other):
-    assert result.observables.keys() == other.observables.keys()
-    for name, values in result.observables.items():
-        assert values.dtype == other.observables[name].dtype
-        assert values.tobytes() == other.observables[name].tobytes(), name
-    assert result.particles.position.tobytes() == other.particles.position.tobytes()
 
 
 # --- Of any scene ----------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from children import python
 from conftest import METHODS, rarely
+from same_bits import require_same, require_same_observables
 
 import swarm
 from examples import long_run
@@ -141,13 +142,10 @@ def test_a_signal_leaves_a_checkpoint_to_resume_from(tmp_path, number, storage):
     expected = run(whole, **storage)
     assert numbers == [3, 4]
     assert not paths.checkpoint_of(path).exists()
-    assert np.array_equal(resumed.particles.position, expected.particles.position)
-    assert np.array_equal(resumed.impacts_per_particle, expected.impacts_per_particle)
+    require_same(resumed, expected)
     with swarm.load(path) as one, swarm.load(whole) as other:
         assert len(one) == len(other) == 5
-        for name, values in expected.observables.items():
-            assert np.array_equal(values, resumed.observables[name]), name
-            assert np.array_equal(values, one.observables[name]), name
+        require_same_observables(one, expected)
         if storage.get("frames") != "none":
             for k in range(5):
                 assert np.array_equal(one.frame(k).velocity, other.frame(k).velocity)
@@ -189,9 +187,7 @@ def test_the_wall_time_ends_a_run_in_the_middle_of_a_frame(tmp_path, monkeypatch
             assert saved.following == 20.0 * (saved.frame + 1)
             frames.append(saved.frame)
     assert frames == [0] * 5 + [1] * 5 + [2] * 5
-    assert np.array_equal(result.particles.position, expected.particles.position)
-    for name, values in expected.observables.items():
-        assert np.array_equal(values, result.observables[name]), name
+    require_same(result, expected)
     assert result.wall_time == len(frames) * day
 
 
@@ -598,5 +594,4 @@ def test_kill_9_at_random_moments(tmp_path):
         for i in range(0, 50, 7):
             for mine, its in zip(one.particle(i), other.particle(i), strict=True):
                 assert np.array_equal(mine, its)
-        for name, values in expected.observables.items():
-            assert np.array_equal(one.observables[name], values), name
+        require_same_observables(one, expected)

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from cut_short import in_sessions
+from same_bits import require_same
 
 import swarm
 from swarm.events.balls_run import CollidingRun
@@ -36,15 +37,6 @@ def poured(name, blocked="wait", **more):
     source = swarm.Source(**{**vars(source), "blocked": blocked})
     options = {"until": 0.2, "every": 0.05, "compile": "never", "seed": 7, "threads": 1, "sources": source, **more}
     return swarm.simulate(swarm.Scene(surfaces, **scene), None, swarm.Impact(), **options)
-
-
-def same(one, other):
-    for name, values in one.observables.items():
-        np.testing.assert_array_equal(values, other.observables[name], err_msg=name)
-    for name in ("position", "velocity", "mass", "radius", "image"):
-        np.testing.assert_array_equal(getattr(one.particles, name), getattr(other.particles, name), err_msg=name)
-    for name in ("impacts_per_particle", "birth_time", "escape_time"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
 
 
 @pytest.mark.parametrize("blocked", ["wait", "report"])
@@ -100,7 +92,7 @@ def test_a_full_vessel_is_full(tmp_path):
 @pytest.mark.parametrize("name", ["a box", "a valve"])
 def test_threads_frames_halts_and_resumes_change_no_bit(name, tmp_path, monkeypatch):
     one = poured(name, trajectory=tmp_path / "whole.h5")
-    same(one, poured(name, threads=2))
+    require_same(one, poured(name, threads=2))
     many = poured(name, every=0.01)
     np.testing.assert_array_equal(one.particles.position, many.particles.position)
     parts, sessions = in_sessions(
@@ -110,7 +102,7 @@ def test_threads_frames_halts_and_resumes_change_no_bit(name, tmp_path, monkeypa
         lambda: poured(name, trajectory=tmp_path / "parts.h5", resume=True, checkpoint=1e3),
     )
     assert sessions > 5
-    same(one, parts)
+    require_same(one, parts)
 
 
 def test_births_cross_counters_from_where_they_are():

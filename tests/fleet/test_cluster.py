@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 import psutil
 import pytest
+from same_bits import require_same, require_same_observables
 from test_cli import command
 
 import swarm
@@ -64,11 +65,8 @@ def cavity():
     return scene, swarm.fill(scene, N, speed=1.0, seed=1), swarm.Impact()
 
 
-def require_same(one, other, paths):
-    assert one.observables.keys() == other.observables.keys()
-    for name, values in one.observables.items():
-        assert values.tobytes() == other.observables[name].tobytes(), name
-    assert one.particles.position.tobytes() == other.particles.position.tobytes()
+def require_same_runs(one, other, paths):
+    require_same(one, other)
     with swarm.load(paths[0]) as a, swarm.load(paths[1]) as b:
         assert a.start == b.start
         assert a.times.tolist() == b.times.tolist()
@@ -130,7 +128,7 @@ def test_a_worker_that_is_killed_changes_no_bit(client, alone, kept, tmp_path):
     result = swarm.simulate(*cavity(), **options, cluster=client)
     client.unsubscribe_topic("kept")
     assert len(killed) == 2
-    require_same(alone[0], result, (alone[1], tmp_path / "run.h5"))
+    require_same_runs(alone[0], result, (alone[1], tmp_path / "run.h5"))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "run.shards"]
     assert sorted(path.name for path in (tmp_path / "run.shards").iterdir()) == ["0000.h5", "0001.h5"]
 
@@ -225,8 +223,7 @@ def test_a_run_that_is_stopped_goes_on_where_it_was(client, alone, held, tmp_pat
     again = command(*words, "--resume", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
     with swarm.load(output) as joined, swarm.load(alone[1]) as single:
-        for name, values in single.observables.items():
-            assert values.tobytes() == joined.observables[name].tobytes(), name
+        require_same_observables(joined, single)
         assert joined.frame(-1).position.tobytes() == single.frame(-1).position.tobytes()
     assert len(list((tmp_path / "run.shards").iterdir())) == 3
     complete = command(*words, "--resume", cwd=tmp_path)
@@ -326,7 +323,7 @@ def test_a_coupled_run_is_one_shard_with_the_same_bits(name, client, tmp_path):
     other = swarm.simulate(
         scene, particles.copy(), method, trajectory=tmp_path / "other.h5", cluster=client, **options
     )  # fmt: skip
-    require_same(one, other, (tmp_path / "one.h5", tmp_path / "other.h5"))
+    require_same_runs(one, other, (tmp_path / "one.h5", tmp_path / "other.h5"))
     if name == "wall with a mass":
         assert other.observables["wall_velocity"][-1].any()
         return

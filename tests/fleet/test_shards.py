@@ -6,6 +6,7 @@ import signal
 import numpy as np
 import pytest
 from children import python
+from same_bits import require_same_observables
 
 import swarm
 from bench.shards import carry_out
@@ -176,9 +177,7 @@ def test_any_number_of_shards_gives_the_same_bits(name, count, alone, on_a_clust
     path_of_shards = tmp_path / "run.h5"
     keywords = TIMES | keywords
     other = on_a_cluster(*make(), count, **keywords, trajectory=path_of_shards)
-    assert end.observables.keys() == other.observables.keys()
-    for key, values in end.observables.items():
-        assert the_same(values, other.observables[key]), key
+    require_same_observables(end, other)
     for key in ("position", "velocity", "mass"):
         assert the_same(getattr(end.particles, key), getattr(other.particles, key)), key
     assert the_same(end.impacts, other.impacts)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from cut_short import in_sessions
 from grains_runs import ran
+from same_bits import require_same
 
 import swarm
 from swarm.grains.grains_run import GrainsRun
@@ -120,5 +121,4 @@ def test_a_run_that_is_resumed_counts_the_same(tmp_path, monkeypatch):
         monkeypatch, GrainsRun, 31, lambda: drained(0.3, trajectory=tmp_path / "parts.h5", resume=True, checkpoint=1e3)
     )
     assert sessions > 4
-    for name, values in whole.observables.items():
-        np.testing.assert_array_equal(values, parts.observables[name], err_msg=name)
+    require_same(parts, whole)

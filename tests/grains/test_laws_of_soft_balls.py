@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from cut_short import in_sessions
 from grains_runs import ran
+from same_bits import require_same
 
 import swarm
 from swarm.grains.grains_run import GrainsRun
@@ -165,7 +166,4 @@ def test_a_run_in_many_sessions_has_the_same_bits(tmp_path, monkeypatch):
     parts, ended = in_sessions(monkeypatch, GrainsRun, 90, go)
     assert ended > 3
     assert 0 < whole.observables["absorbed"][-1, 0] < 6
-    assert np.array_equal(parts.particles.position, whole.particles.position)
-    assert np.array_equal(parts.absorbed_time, whole.absorbed_time, equal_nan=True)
-    for key, values in whole.observables.items():
-        assert np.array_equal(parts.observables[key], values, equal_nan=True), key
+    require_same(parts, whole)

@@ -1,13 +1,13 @@
 """Soft grains that come from sources during a run."""
 
 import functools
-import itertools
 import math
 
 import h5py
 import numpy as np
 import pytest
-from cut_short import in_sessions
+from cut_short import halted, in_sessions
+from same_bits import require_same
 
 import swarm
 from swarm.grains.grains_run import GrainsRun
@@ -59,15 +59,6 @@ def poured(name, blocked="wait", **more):
     source = swarm.Source(**{**vars(source), "blocked": blocked})
     options = {"until": 0.08, "every": 0.02, "compile": "never", "seed": 7, "threads": 1, **more}
     return swarm.simulate(scene, start_of(name), SOFT, sources=source, **options)
-
-
-def same(one, other):
-    for name, values in one.observables.items():
-        np.testing.assert_array_equal(values, other.observables[name], err_msg=name)
-    for name in ("position", "velocity", "mass", "radius", "spin", "image"):
-        np.testing.assert_array_equal(getattr(one.particles, name), getattr(other.particles, name), err_msg=name)
-    for name in ("impacts_per_particle", "birth_time"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -153,20 +144,13 @@ def test_a_full_vessel_against_a_loop(blocked, tmp_path):
 @pytest.mark.parametrize("name", ["a box", "sizes"])
 def test_threads_halts_and_frames_change_no_bit(name, monkeypatch):
     one = poured(name)
-    same(one, poured(name, threads=2))
+    require_same(one, poured(name, threads=2))
     many = poured(name, every=DT)
     np.testing.assert_array_equal(one.particles.position, many.particles.position)
     np.testing.assert_array_equal(one.birth_time, many.birth_time)
-    advance, halts = GrainsRun.advance, itertools.count()
-
-    def halting(self, *given, **more):
-        next(halts)
-        self.halt(3)
-        return advance(self, *given, **more)
-
-    monkeypatch.setattr(GrainsRun, "advance", halting)
-    same(one, poured(name))
-    assert next(halts) > 20
+    with halted(monkeypatch, GrainsRun, 3) as calls:
+        require_same(one, poured(name))
+    assert len(calls) > 20
 
 
 @pytest.mark.parametrize("name", ["sizes", "a cell"])
@@ -177,7 +161,7 @@ def test_resumed_at_any_place(name, tmp_path, monkeypatch):
         monkeypatch, GrainsRun, 13, lambda: poured(name, trajectory=tmp_path / "parts.h5", resume=True, checkpoint=1e3)
     )
     assert sessions > 6
-    same(whole, parts)
+    require_same(whole, parts)
     with swarm.load(tmp_path / "whole.h5") as one, swarm.load(tmp_path / "parts.h5") as other:
         for k in range(len(one)):
             np.testing.assert_array_equal(one.frame(k).position, other.frame(k).position)

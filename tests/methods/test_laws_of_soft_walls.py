@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from cut_short import in_sessions
+from same_bits import require_same
 
 import swarm
 from swarm.run.doors import DoorRun
@@ -152,7 +153,4 @@ def test_a_run_in_many_sessions_has_the_same_bits(tmp_path, monkeypatch):
 
     parts, ended = in_sessions(monkeypatch, DoorRun, 8, go)
     assert ended > 4
-    assert np.array_equal(parts.particles.position, whole.particles.position)
-    assert np.array_equal(parts.escape_time, whole.escape_time, equal_nan=True)
-    for key, values in whole.observables.items():
-        assert np.array_equal(parts.observables[key], values), key
+    require_same(parts, whole)

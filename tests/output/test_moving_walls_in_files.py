@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from same_bits import require_same_observables
 
 import swarm
 from swarm.motion import pose
@@ -48,9 +49,7 @@ def test_the_trajectory_has_them(run):
         assert seen["wall_position"].shape == (5, 3, 3)
         assert seen["wall_orientation"].shape == (5, 3, 4)
         assert seen["wall_work"].shape == (5, 3)
-        assert seen.keys() == result.observables.keys()
-        for name, values in result.observables.items():
-            np.testing.assert_array_equal(seen[name], values)
+        require_same_observables(trajectory, result)
 
 
 def test_a_given_motion_is_where_its_table_says():

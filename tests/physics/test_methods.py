@@ -1,9 +1,9 @@
 """What holds for every method of the table."""
 
 import numba
-import numpy as np
 import pytest
 from conftest import METHODS
+from same_bits import require_same
 from test_tiers import assert_same_bits
 
 import swarm
@@ -32,11 +32,6 @@ def test_threads_blocks_and_tiers_change_no_bit(name, monkeypatch):
     first = runs[0]
     assert first.observables["impacts"][-1] > 1001
     for other in runs[1:]:
-        assert np.array_equal(first.particles.position, other.particles.position)
-        assert np.array_equal(first.particles.velocity, other.particles.velocity)
-        for key, seen in first.observables.items():
-            assert np.array_equal(seen, other.observables[key]), key
-        for column, same in zip(first.multipliers or (), other.multipliers or (), strict=True):
-            assert np.array_equal(column, same)
+        require_same(first, other)
     if not numba.config.DISABLE_JIT:
         assert_same_bits(monkeypatch, SCENE, CASES[name])

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import rarely
+from same_bits import require_same
 from test_examples import lines_of
 from test_sessions import require_resumed_is_whole
 
@@ -61,12 +62,6 @@ def run(walls, gravity=None, until=3.0, n=40, **options):
     scene = swarm.Scene(walls, gravity)
     start = swarm.fill(scene, n, speed=1.0, mass=np.linspace(0.5, 2.0, n), seed=2)
     return swarm.simulate(scene, start, swarm.Impact(), until=until, **options)
-
-
-def same_bits(one, other):
-    pairs = [(one.observables[name], other.observables[name]) for name in one.observables]
-    pairs += [(getattr(one.particles, name), getattr(other.particles, name)) for name in ("position", "velocity")]
-    return all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
 
 
 def balance(result):
@@ -165,10 +160,10 @@ def test_the_same_bits_compiled_in_plain_python_and_in_any_threads(name, laws, g
     walls = cup(laws) if name == "cup" else WALLS[name](laws=laws)
     one, two = (run(walls, gravity, 1.0, compile="always", threads=threads) for threads in (1, 2))
     assert one.observables["impacts"][-1] > 50
-    assert same_bits(one, two)
+    require_same(one, two)
     few, plain = (run(walls, gravity, 1.0, n=3, compile=tier) for tier in ("always", "never"))
     assert few.observables["impacts"][-1] > 3
-    assert same_bits(few, plain)
+    require_same(few, plain)
 
 
 def test_a_resumed_run_is_a_whole_one(tmp_path):

@@ -5,7 +5,8 @@ import functools
 
 import numpy as np
 import pytest
-from cut_short import in_sessions
+from cut_short import halted, in_sessions
+from same_bits import require_same
 
 import swarm
 from swarm.run.engine import Run
@@ -67,15 +68,6 @@ def run(name, **more):
     return swarm.simulate(scene, start, swarm.Impact(), sources=source, **{**TIMES, "threads": 1, **more})
 
 
-def same(one, other):
-    for name, values in one.observables.items():
-        np.testing.assert_array_equal(values, other.observables[name], err_msg=name)
-    for name in ("position", "velocity", "mass", "image"):
-        np.testing.assert_array_equal(getattr(one.particles, name), getattr(other.particles, name), err_msg=name)
-    for name in ("impacts_per_particle", "escape_time", "birth_time"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_threads_blocks_and_halts(name, monkeypatch):
     """In plain Python; halted in every frame after each few passes."""
@@ -84,24 +76,17 @@ def test_threads_blocks_and_halts(name, monkeypatch):
     assert one.observables["born"][-1].sum() > 100
     assert one.particles.position.shape[1] > 256
     assert one.observables["energy_error"].max() < 1e-12
-    same(one, run(name, threads=2, block_size=256, **plain))
-    advance, halts = Run.advance, [0]
-
-    def halting(self, *given, **more):
-        halts[0] += 1
-        self.halt(1)
-        return advance(self, *given, **more)
-
-    monkeypatch.setattr(Run, "advance", halting)
-    same(one, run(name, **plain))
-    assert halts[0] > 10
+    require_same(one, run(name, threads=2, block_size=256, **plain))
+    with halted(monkeypatch, Run, 1) as calls:
+        require_same(one, run(name, **plain))
+    assert len(calls) > 10
 
 
 @pytest.mark.parametrize("name", COMPILED)
 def test_compiled_and_in_plain_python(name):
     one = run(name, compile="never")
     for threads in (1, 2):
-        same(one, run(name, compile="always", threads=threads))
+        require_same(one, run(name, compile="always", threads=threads))
 
 
 @pytest.mark.parametrize("name", COMPILED)
@@ -115,7 +100,7 @@ def test_resumed_at_any_place(name, tmp_path, monkeypatch):
         lambda: run(name, compile="never", trajectory=tmp_path / "parts.h5", resume=True, checkpoint=1e3),
     )
     assert sessions > 12
-    same(whole, parts)
+    require_same(whole, parts)
     with swarm.load(tmp_path / "whole.h5") as one, swarm.load(tmp_path / "parts.h5") as other:
         for k in range(len(one)):
             np.testing.assert_array_equal(one.frame(k).position, other.frame(k).position)
@@ -150,5 +135,6 @@ def test_a_scene_without_sources_has_the_same_bits():
         for given in (None, [swarm.Source(0, times=[5.0], speed=1.0)])
     )
     assert "born" not in none.observables
-    same(none, late)
+    shared = {name: late.observables[name] for name in none.observables}
+    require_same(none, dataclasses.replace(late, observables=shared))
     assert none.birth_time.max() == late.birth_time.max() == 0.0

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from bounded import bounded
 from conftest import rarely
-from stability.interrupted import require_same_bits
+from cut_short import require_same_bits
+from same_bits import require_same
 from stability.test_against_an_event_loop import (
     BOOKS,
     FRAMES,
@@ -201,16 +202,6 @@ def require_balance(made, result, frames, born):
             assert abs(-net[k] - change) <= unsure, f"counter {c}, frame {k}"
 
 
-def require_same(one, other):
-    assert one.observables.keys() == other.observables.keys()
-    for name, values in one.observables.items():
-        np.testing.assert_array_equal(values, other.observables[name], err_msg=name)
-    for name in ("position", "velocity", "mass"):
-        np.testing.assert_array_equal(getattr(one.particles, name), getattr(other.particles, name), err_msg=name)
-    for name in ("impacts_per_particle", "escape_time", "absorbed_time", "birth_time"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
-
-
 def holds(seed, folder, certain=False):
     """The run of a seed, with what balances; returns the scene, the result, and states compared to the event loop."""
     made, path = a_scene(seed, certain), folder / f"{seed}.h5"
@@ -228,11 +219,9 @@ def holds(seed, folder, certain=False):
 def has_same_bits(seed, folder, monkeypatch):
     """Any threads and blocks, halts within frames, and sessions."""
     made = a_scene(seed)
-    result = ran(made)
-    if result is None:
-        return
-    pieces = functools.partial(run, made)
-    require_same_bits(Run, pieces, functools.partial(require_same, result), folder, monkeypatch)
+    whole = ran(made)
+    if whole is not None:
+        require_same_bits(monkeypatch, Run, whole, functools.partial(run, made), folder / "parts.h5")
 
 
 def hold_many(seeds, folder, monkeypatch, certain=False):

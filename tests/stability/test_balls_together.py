@@ -10,10 +10,11 @@ import mpmath
 import numpy as np
 import pytest
 from conftest import rarely
+from cut_short import require_same_bits
 from physics import ball_loop
 from physics.ball_loop import follow
 from physics.ball_walls import Walls
-from stability.interrupted import require_same_bits
+from same_bits import require_same
 from stability.test_against_an_event_loop import SOLIDS, VESSELS, a_motion
 
 import swarm
@@ -190,15 +191,6 @@ def require_books(scene, start, frames, seen):
             assert not frame.velocity[2].any()
 
 
-def require_same(one, other):
-    assert one.observables.keys() == other.observables.keys()
-    for name, values in one.observables.items():
-        np.testing.assert_array_equal(values, other.observables[name], err_msg=name)
-    for name in ("position", "velocity", "mass", "radius"):
-        np.testing.assert_array_equal(getattr(one.particles, name), getattr(other.particles, name), err_msg=name)
-    np.testing.assert_array_equal(one.impacts_per_particle, other.impacts_per_particle)
-
-
 def holds(seed, folder):
     """The run of a seed; returns the scene, the result or None where it is refused, and how many frames compared."""
     made, path = a_scene(seed), folder / f"{seed}.h5"
@@ -220,11 +212,10 @@ def has_same_bits(seed, folder, monkeypatch):
     """Any threads and blocks, halts within frames, and sessions."""
     made = a_scene(seed)
     try:
-        result = run(made)
+        whole = run(made)
     except swarm.SceneError:
         return
-    pieces = functools.partial(run, made)
-    require_same_bits(CollidingRun, pieces, functools.partial(require_same, result), folder, monkeypatch)
+    require_same_bits(monkeypatch, CollidingRun, whole, functools.partial(run, made), folder / "parts.h5")
 
 
 @pytest.mark.physics
