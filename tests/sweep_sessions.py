@@ -9,34 +9,16 @@ import sys
 import time
 
 import psutil
+from scene_texts import in_a_sphere
 
 import swarm
 
-SCENE = """
-[particles]
-count = {count}
-speed = 1.0
-
-[[surface]]
-kind = "sphere"
-radius = 0.5
-
-[method]
-kind = "impact"
-
-[run]
-until = 2.0
-every = 0.5
-compile = "never"
-{run}
-[sweep]
-{sweep}
-"""
+LINES = 'until = 2.0\nevery = 0.5\ncompile = "never"\n'
 RUNNING = 120.0  # seconds after which a test gives up
 
 
 def write(path, sweep, count=5, run=""):
-    path.write_text(SCENE.format(count=count, run=run, sweep=sweep))
+    path.write_text(in_a_sphere(LINES + run, count, sweep=sweep))
     return path
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scene_texts import in_a_sphere
 from test_cli import command
 
 ROOT = Path(__file__).parents[1]
@@ -19,24 +20,7 @@ PAGES = {path: re.split(r"^## ", path.read_text(), flags=re.MULTILINE) for path 
 ANSWERS = [(path, *answer.split("\n", 1)) for path, (_, *answers) in PAGES.items() for answer in answers]
 TEXTS = {title: text for _path, title, text in ANSWERS}
 CHAIN = "A chain of jobs on a cluster"
-SCENE = """
-[particles]
-count = 100
-speed = 1.0
-
-[[surface]]
-kind = "sphere"
-radius = 0.5
-
-[method]
-kind = "impact"
-
-[run]
-until = 20.0
-every = 0.2
-compile = "never"
-frames = "none"
-"""
+SCENE = in_a_sphere('until = 20.0\nevery = 0.2\ncompile = "never"\nframes = "none"', 100)
 
 
 def close(value, expected, part):

@@ -9,6 +9,7 @@ import pytest
 from children import python
 from click.testing import CliRunner
 from conftest import edited, files_limited_to
+from scene_texts import in_a_sphere
 from test_sessions import halted_after, stopped_at
 
 import swarm
@@ -490,20 +491,7 @@ def test_a_full_disk_ends_the_run_and_keeps_the_frames_before(tmp_path, monkeypa
 
 # --- From the command line -------------------------------------------------------------------------------
 
-SCENE_FILE = """
-[particles]
-count = 10
-speed = 1.0
-[[surface]]
-kind = "sphere"
-radius = 0.5
-[method]
-kind = "impact"
-[run]
-until = 2.0
-every = 1.0
-compile = "never"
-"""
+SCENE_FILE = in_a_sphere('until = 2.0\nevery = 1.0\ncompile = "never"')
 
 
 def test_a_scene_file_and_the_command_name_a_log(tmp_path, monkeypatch):

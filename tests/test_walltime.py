@@ -7,6 +7,7 @@ import click
 import pytest
 from numba.core import event
 from same_bits import require_same
+from scene_texts import in_a_sphere
 
 import swarm
 from swarm.commands.run import run as command
@@ -18,22 +19,7 @@ from swarm.run.options import RunOptions
 from swarm.run.session import Session
 
 LOSSY = swarm.Scene([swarm.Box((0.5, 0.5, 0.5), restitution=0.5, friction=0.3)], (0.0, 0.0, -9.81))
-SCENE = """
-[particles]
-count = 10
-speed = 1.0
-
-[[surface]]
-kind = "sphere"
-radius = 0.5
-
-[method]
-kind = "impact"
-
-[run]
-until = 1000.0
-every = 1.0
-"""
+SCENE = in_a_sphere("until = 1000.0\nevery = 1.0")
 
 
 class Clock:

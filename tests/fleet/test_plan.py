@@ -3,28 +3,13 @@
 import tomllib
 
 import pytest
+from scene_texts import in_a_sphere
 
 import swarm
 from swarm import scene_file
 from swarm.fleet.plan import read
 
-BASE = """
-gravity = [0.0, 0.0, -9.81]
-
-[particles]
-count = 10
-speed = 1.0
-
-[[surface]]
-kind = "sphere"
-radius = 0.5
-
-[method]
-kind = "impact"
-
-[run]
-until = 1.0
-"""
+BASE = in_a_sphere("until = 1.0", before="gravity = [0.0, 0.0, -9.81]")
 
 
 @pytest.fixture

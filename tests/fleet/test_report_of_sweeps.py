@@ -5,28 +5,16 @@ import shutil
 
 import pytest
 from pages import Read
+from scene_texts import in_a_sphere
 
 import swarm
 from swarm.fleet import curves
 from swarm.fleet.folder import found
 
-SWEEP = """
-[particles]
-count = 5
-speed = 1.0
-[[surface]]
-kind = "sphere"
-radius = 0.5
-[method]
-kind = "impact"
-[run]
-until = 1.0
-every = 0.5
-compile = "never"
-[sweep]
-"surface.0.restitution" = [0.5, 0.9]
-"particles.seed" = {range = 2}
-"""
+SWEEP = in_a_sphere(
+    'until = 1.0\nevery = 0.5\ncompile = "never"', 5,
+    sweep='"surface.0.restitution" = [0.5, 0.9]\n"particles.seed" = {range = 2}',
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

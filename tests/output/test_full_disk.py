@@ -6,23 +6,11 @@ import random
 
 import pytest
 from children import python
+from scene_texts import in_a_sphere
 
 import swarm
 
-SCENE = """
-[particles]
-count = 60
-speed = 1.0
-[[surface]]
-kind = "sphere"
-radius = 0.5
-[method]
-kind = "impact"
-[run]
-until = 1.0
-every = 0.05
-compile = "never"
-"""
+SCENE = in_a_sphere('until = 1.0\nevery = 0.05\ncompile = "never"', 60)
 # The commands that write each kind of file, and those of a run whose files these are.
 EXPORTS = {
     **dict.fromkeys(("csv", "xyz", "gsd", "ply", "obj", "vtkhdf"), "export run.h5"),

@@ -11,6 +11,7 @@ import pytest
 from children import python
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from pages import Read
+from scene_texts import in_a_sphere
 
 import swarm
 from examples.own_law import Viscoelastic
@@ -23,21 +24,7 @@ from swarm.triangles.shapes import shapes_of
 from swarm.words.facts import of_trajectory
 from swarm.words.statements import Statement
 
-SCENE = """
-gravity = [0.0, 0.0, -9.81]
-[particles]
-count = 20
-speed = 1.0
-seed = 3
-[[surface]]
-kind = "sphere"
-radius = 0.5
-[method]
-kind = "impact"
-[run]
-until = 1.0
-every = 0.25
-"""
+SCENE = in_a_sphere("until = 1.0\nevery = 0.25", "20\nseed = 3", before="gravity = [0.0, 0.0, -9.81]")
 SECTIONS = ["verdicts", "happened", "places", "scene", "series", "numbers", "speed", "reproduce"]
 
 

@@ -5,6 +5,7 @@ import signal
 
 import pytest
 from children import python
+from scene_texts import in_a_sphere
 
 import swarm
 from swarm.pictures import plots
@@ -38,22 +39,7 @@ def test_a_recording_where_nothing_may_be_written_is_a_sentence(run, tmp_path, m
 
 
 def test_a_folder_that_cannot_be_made_is_a_sentence(tmp_path):
-    (tmp_path / "sweep.toml").write_text(
-        """
-        [particles]
-        count = 5
-        speed = 1.0
-        [[surface]]
-        kind = "sphere"
-        radius = 0.5
-        [method]
-        kind = "impact"
-        [run]
-        until = 1.0
-        [sweep]
-        "particles.seed" = [1, 2]
-        """
-    )
+    (tmp_path / "sweep.toml").write_text(in_a_sphere("until = 1.0", 5, sweep='"particles.seed" = [1, 2]'))
     with pytest.raises(swarm.FileError, match=r"cannot make the folder .*sweep\.toml/runs: Not a directory"):
         swarm.sweep(tmp_path / "sweep.toml", tmp_path / "sweep.toml" / "runs")
 
