@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import refused
 
 import swarm
 
@@ -282,9 +283,8 @@ def test_no_tolerance_stops_at_max_sweeps():
 )
 def test_errors_name_the_argument(changes, parts):
     arguments = {"scene": SPHERE, "position": (0.0, 0.0, 0.0), "velocity": (0.3, 0.4, 0.0), "mass": 1.0}
-    with pytest.raises(swarm.SceneError) as caught:
+    with refused(parts):
         swarm.contact_history(**{**arguments, "method": METHOD, **changes})
-    assert all(part in str(caught.value) for part in parts), str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -296,6 +296,5 @@ def test_errors_name_the_argument(changes, parts):
 )
 def test_wrong_types_are_named(changes, parts):
     arguments = {"scene": SPHERE, "position": (0.0, 0.0, 0.0), "velocity": (0.3, 0.4, 0.0), "mass": 1.0}
-    with pytest.raises(swarm.SceneError) as caught:
+    with refused(parts):
         swarm.contact_history(**{**arguments, "method": METHOD, **changes})
-    assert all(part in str(caught.value) for part in parts), str(caught.value)

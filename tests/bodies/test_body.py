@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from conftest import refused
 
 import swarm
 
@@ -192,9 +193,8 @@ def test_what_is_not_linked_may_go_anywhere():
     ],
 )
 def test_errors_name_the_argument(options, parts):
-    with pytest.raises(swarm.SceneError) as caught:
+    with refused(parts):
         square(**options)
-    assert all(part in str(caught.value) for part in parts), str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -208,9 +208,8 @@ def test_errors_name_the_argument(options, parts):
     ],
 )
 def test_errors_name_the_points(points, parts):
-    with pytest.raises(swarm.SceneError) as caught:
+    with refused(parts):
         swarm.Body(points, 1.0)
-    assert all(part in str(caught.value) for part in parts), str(caught.value)
 
 
 @pytest.mark.parametrize("apart", [0.0, 1e-14])
@@ -237,6 +236,5 @@ def test_a_link_and_a_spring_need_a_direction(apart):
     ],
 )
 def test_errors_of_a_strain(build, parts):
-    with pytest.raises(swarm.SceneError) as caught:
+    with refused(parts):
         build()
-    assert all(part in str(caught.value) for part in parts), str(caught.value)
