@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from cut_short import in_sessions
+from energy_books import unbooked
 from grains_runs import ran
 from same_bits import require_same
 
@@ -31,9 +32,7 @@ def went(scene, start, method=SOFT, until=0.5, **options):
 
 
 def balanced(seen):
-    total = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_heat"].sum(axis=1)
-    total = total - seen["wall_work"].sum(axis=1) if "wall_work" in seen else total
-    return np.abs(total - total[0]).max() / (seen["kinetic_energy"].max() + np.ptp(seen["potential_energy"]))
+    return unbooked(seen) / (seen["kinetic_energy"].max() + np.ptp(seen["potential_energy"]))
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from cut_short import in_sessions
+from energy_books import unbooked
 from same_bits import require_same
 
 import swarm
@@ -36,10 +37,7 @@ def ran(scene, particles, method, until=1.0, every=0.25, **options):
 
 
 def balanced(seen):
-    total = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_heat"].sum(axis=1)
-    if "wall_work" in seen:
-        total = total - seen["wall_work"].sum(axis=1)
-    return np.abs(total - total[0]).max() / (seen["kinetic_energy"].max() + np.ptp(seen["potential_energy"]))
+    return unbooked(seen) / (seen["kinetic_energy"].max() + np.ptp(seen["potential_energy"]))
 
 
 def one(velocity=(0.6, 0.0, -1.0)):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from energy_books import unbooked
 
 import swarm
 
@@ -23,8 +24,7 @@ def ran(scene, particles, method, until=1.0, every=0.25, **options):
 
 
 def balanced(seen):
-    total = seen["total_energy"] + seen["dissipated_energy"]
-    return np.abs(total - total[0]).max() / (seen["kinetic_energy"].max() + seen["contact_energy"].max())
+    return unbooked(seen) / (seen["kinetic_energy"].max() + seen["contact_energy"].max())
 
 
 def floor(*openings, gravity=DOWN, **laws):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from energy_books import unbooked
 
 import swarm
 
@@ -79,8 +80,7 @@ def test_a_foam_settles_under_gravity():
     seen = result.observables
     assert np.abs(result.particles.velocity).max() <= 1e-9
     assert seen["max_penetration"].max() <= 1e-12
-    kept = seen["total_energy"] + seen["dissipated_energy"]
-    assert kept == pytest.approx(kept[0], abs=1e-10 * np.abs(kept).max())
+    assert unbooked(seen) <= 1e-10 * abs(seen["total_energy"][0])
 
 
 @pytest.mark.parametrize(

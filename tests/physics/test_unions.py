@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from energy_books import unbooked
 
 import swarm
 from swarm.surfaces.instant import side_of
@@ -259,8 +260,7 @@ def test_a_hopper_empties_and_what_was_in_it_rests(tmp_path):
     assert result.particles.position[2] == pytest.approx(-1.3, abs=1e-9)
     assert np.abs(result.particles.velocity).max() <= 1e-9
     seen = result.observables
-    kept = seen["total_energy"] + seen["dissipated_energy"]
-    assert kept == pytest.approx(kept[0], abs=1e-10 * np.abs(kept).max())
+    assert unbooked(seen) <= 1e-10 * abs(seen["total_energy"][0])
     assert seen["max_penetration"].max() <= 1e-12
 
 
