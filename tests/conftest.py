@@ -128,14 +128,6 @@ def row(*values):
         raise
 
 
-@contextlib.contextmanager
-def refused(parts, error=swarm.SceneError):
-    """What is refused in a message with all of these parts."""
-    with pytest.raises(error) as caught:
-        yield caught
-    assert all(part in str(caught.value) for part in parts), str(caught.value)
-
-
 def every_pair(**axes):
     """Parametrize by a product. The long ring has all of it, others each pair of values at least once.
 

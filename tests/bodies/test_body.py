@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 import pytest
-from conftest import refused
 
 import swarm
 
@@ -193,8 +192,9 @@ def test_what_is_not_linked_may_go_anywhere():
     ],
 )
 def test_errors_name_the_argument(options, parts):
-    with refused(parts):
+    with pytest.raises(swarm.SceneError) as caught:
         square(**options)
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -208,8 +208,9 @@ def test_errors_name_the_argument(options, parts):
     ],
 )
 def test_errors_name_the_points(points, parts):
-    with refused(parts):
+    with pytest.raises(swarm.SceneError) as caught:
         swarm.Body(points, 1.0)
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
 
 
 @pytest.mark.parametrize("apart", [0.0, 1e-14])
@@ -236,5 +237,6 @@ def test_a_link_and_a_spring_need_a_direction(apart):
     ],
 )
 def test_errors_of_a_strain(build, parts):
-    with refused(parts):
+    with pytest.raises(swarm.SceneError) as caught:
         build()
+    assert all(part in str(caught.value) for part in parts), str(caught.value)

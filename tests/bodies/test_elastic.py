@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from conftest import refused
 from scipy.spatial import Delaunay
 
 import swarm
@@ -142,8 +141,9 @@ def changed(first):
 )
 def test_errors_name_the_argument(options, parts):
     given = {"mesh": (NODES, ELEMENTS), "young": 1.0, "poisson": 0.3, "density": 1.0} | options
-    with refused(parts):
+    with pytest.raises(swarm.SceneError) as caught:
         swarm.elastic(**given)
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
 
 
 def test_three_elements_at_a_triangle_overlap():
@@ -162,5 +162,6 @@ def test_three_elements_at_a_triangle_overlap():
     ],
 )
 def test_errors_of_a_block(lengths, cells, parts):
-    with refused(parts):
+    with pytest.raises(swarm.SceneError) as caught:
         block(lengths, cells)
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
