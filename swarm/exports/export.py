@@ -85,7 +85,7 @@ def _write(form: Any, chosen: Exported, parts: list[Path]) -> None:
     if len(parts) > 1:
         from . import walls
 
-        walls.write_walls(chosen, walls.shapes(chosen), parts[1])
+        walls.write_walls(chosen, parts[1])
     if len(parts) > _WITH_WALLS:
         walls.write_solids(chosen, parts[2])
     form.write(chosen, parts[0])

@@ -1,8 +1,9 @@
 """The part of a trajectory that is exported: some of its frames, and some of its particles or bodies."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -91,6 +92,17 @@ class Exported:
             yield ExportedFrame(number, time, position, velocity, held, self.ids[there], self.mass[there], radius)
             if self._progress is not None:
                 self._progress(done + 1, len(self.numbers))
+
+
+def lines_of(columns: Iterable[NDArray[Any]], begin: bytes, between: bytes, missing: bytes = b"") -> bytes:
+    """Columns (n,) or (n, 3) as text, a line a row; numbers have the digits that give the same bits again.
+
+    A writer of JSON is three times as fast as formatting by Python: [[1.5,2],[...]]. It has null for a NaN.
+    """
+    numbers = [part for column in columns for part in np.atleast_2d(column.T).tolist()]
+    rows = msgspec.json.encode(list(zip(*numbers, strict=True)))[2:-2].replace(b"null", missing)
+    rows = (rows if between == b"," else rows.replace(b",", between)).replace(b"]" + between + b"[", b"\n" + begin)
+    return begin + rows + b"\n" if rows else b""
 
 
 def numbers_of(frames: slice | int | None, n: int) -> range:

@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +19,7 @@ from ..state import Floats
 from ..surfaces.instant import side_of
 from ..triangles.shape import Shape
 from ..triangles.shapes import shapes_of, since_start
+from .exported import lines_of
 
 # Bodies of one surface that are drawn: each has some 200 vertices.
 _MOST = 20_000
@@ -36,7 +36,6 @@ def materials_of(target: Path) -> Path:
 def write_objects(trajectory: Any, number: int, path: Path, materials: Path) -> None:
     """Write the walls at a frame, and their materials."""
     scene, time = trajectory.scene, float(trajectory.times[number])
-    encode = msgspec.json.Encoder().encode
     with open(path, "wb") as file:
         file.write(f"# swarm: walls at frame {number}, {time!r} s, in m\nmtllib {materials.name}\n".encode())
         first = 1
@@ -46,10 +45,9 @@ def write_objects(trajectory: Any, number: int, path: Path, materials: Path) -> 
                 if count > _MOST:
                     file.write(f"# {shape.name}: {count} bodies, more than {_MOST}, are left out\n".encode())
                 continue
-            corners = encode(shape.vertices.tolist())[2:-2].replace(b"],[", b"\nv ").replace(b",", b" ")
-            triangles = encode((shape.triangles + first).tolist())[2:-2].replace(b"],[", b"\nf ").replace(b",", b" ")
-            material = f"usemtl {'solid' if shape.solid else 'cavity'}".encode()
-            file.write(f"o {shape.name}\nv ".encode() + corners + b"\n" + material + b"\nf " + triangles + b"\n")
+            file.write(f"o {shape.name}\n".encode() + lines_of([shape.vertices], b"v ", b" "))
+            file.write(f"usemtl {'solid' if shape.solid else 'cavity'}\n".encode())
+            file.write(lines_of([shape.triangles + first], b"f ", b" "))
             first += len(shape.vertices)
     with open(materials, "w", encoding="ascii") as out:
         for name, colour in (("cavity", colours.CAVITY), ("solid", colours.SOLID)):

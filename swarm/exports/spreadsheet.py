@@ -10,10 +10,7 @@ the escape time of a particle that is inside. A file of one frame is a start: `f
 from pathlib import Path
 from typing import Any
 
-import msgspec
-import numpy as np
-
-from .exported import Exported
+from .exported import Exported, lines_of
 
 # Columns of vectors, by their names; of others the names of the components are NAME_x, NAME_y, NAME_z.
 _VECTORS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "spin": ("wx", "wy", "wz")}
@@ -21,8 +18,7 @@ _VECTORS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "spin":
 
 def write(chosen: Exported, path: Path) -> None:
     """Write the particles."""
-    encode, begun = msgspec.json.Encoder().encode, False
-    copies = chosen.trajectory.copies
+    begun, copies = False, chosen.trajectory.copies
     with open(path, "wb") as file:
         for moment in chosen.moments():
             columns: dict[str, Any] = {"id": moment.ids, "position": moment.position, "velocity": moment.velocity}
@@ -35,12 +31,7 @@ def write(chosen: Exported, path: Path) -> None:
                 names = [part for name, column in columns.items() for part in _names(name, column.ndim)]
                 file.write(f"frame,time,{','.join(names)}\n".encode())
                 begun = True
-            if not len(moment.ids):
-                continue
-            numbers = [part for column in columns.values() for part in np.atleast_2d(column.T).tolist()]
-            # A writer of JSON is three times as fast as formatting by Python, with the same digits: [[1.5,2],[...]].
-            rows, begin = encode(list(zip(*numbers, strict=True)))[2:-2], f"{moment.number},{moment.time!r},".encode()
-            file.write(begin + rows.replace(b"],[", b"\n" + begin).replace(b"null", b"") + b"\n")
+            file.write(lines_of(columns.values(), f"{moment.number},{moment.time!r},".encode(), b","))
 
 
 def _names(name: str, dimensions: int) -> tuple[str, ...]:

@@ -30,25 +30,24 @@ from .exported import Exported
 KINDS = ("spheres", "boxes", "cylinders", "capsules", "ellipsoids")
 
 
-def shapes(chosen: Exported) -> list[Shape]:
-    """The walls at the start, as far as there were particles in the first frame that is exported."""
-    positions = chosen.trajectory.frame(chosen.numbers[0]).position
-    return shapes_of(chosen.trajectory.scene, positions, most=MANY)
+def write_walls(chosen: Exported, path: Path) -> None:
+    """Write the walls, as far as there are particles in the first frame.
 
-
-def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
-    """Write the walls. Where walls or openings change with time, each frame has the walls of its time."""
-    if chosen.trajectory.scene.instants:
+    Where walls or openings change with time, each frame has the walls of its time.
+    """
+    scene, positions = chosen.trajectory.scene, chosen.trajectory.frame(chosen.numbers[0]).position
+    if scene.instants:
         _write_changing(chosen, path)
         return
+    drawn = shapes_of(scene, positions, most=MANY)
     firsts = np.cumsum([0, *(len(shape.vertices) for shape in drawn)])
     triangles = _triangles(drawn)
     with h5py.File(path, "w") as file:
         root = vtkhdf.begin(file, {"Polygons": triangles}, [int(firsts[-1])])
         counts = [len(shape.triangles) for shape in drawn]
-        for name, numbers in _data_of(chosen.trajectory.scene, drawn).items():
+        for name, numbers in _data_of(scene, drawn).items():
             root[f"CellData/{name}"] = np.repeat(numbers, counts)
-        moves = chosen.trajectory.scene.moves()
+        moves = scene.moves()
         if not moves:
             root["Points"] = np.concatenate([shape.vertices for shape in drawn])
         if not (moves or chosen.trajectory.members()):
@@ -64,7 +63,7 @@ def write_walls(chosen: Exported, drawn: list[Shape], path: Path) -> None:
         for done, number in enumerate(chosen.numbers):
             places = seen["wall_position"][number], seen["wall_orientation"][number]
             for shape, first in zip(drawn, done * firsts[-1] + firsts[:-1], strict=True):
-                turn, way = since_start(chosen.trajectory.scene, shape, seen["time"][number], places)
+                turn, way = since_start(scene, shape, seen["time"][number], places)
                 points[first : first + len(shape.vertices)] = shape.vertices @ turn.T + way
 
 

@@ -152,12 +152,10 @@ class Playback:
         latest = -1 if number is None else max((k for k in sent if k <= number), default=-1)
 
         def column(part: str, name: str) -> Any:
-            kept = self._static.get((f"{wall}/{part}", name)) if number is None else None
-            if kept is not None:
-                return kept.as_py() or []
-            if number is None:
-                return []
-            return self._row(f"{wall}/{part}", name, latest) or []
+            if number is not None:
+                return self._row(f"{wall}/{part}", name, latest) or []
+            kept = self._static.get((f"{wall}/{part}", name))
+            return [] if kept is None else kept.as_py() or []
 
         mesh = [np.reshape(column("mesh", name), (-1, 3)) for name in (_CORNERS, _TRIANGLES, _NORMALS)]
         edges, levels = ([np.array(strip) for strip in column(part, _STRIPS)] for part in ("wires", "levels"))

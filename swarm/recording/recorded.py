@@ -44,10 +44,6 @@ def _record(trajectory: Any, path: Path | None, part: Path | None, settings: Set
     with writer as write:
         for first in range(0, frames, _AT_ONCE):
             numbers = range(first, min(first + _AT_ONCE, frames))
-            write(
-                [
-                    (k, times[k], trajectory.frame(k), {name: values[k] for name, values in seen.items()})  # type: ignore[misc]
-                    for k in numbers
-                ]
-            )
+            here = ({name: values[k] for name, values in seen.items()} for k in numbers)
+            write([(k, times[k], trajectory.frame(k), some) for k, some in zip(numbers, here, strict=True)])  # type: ignore[misc]
     return writer.stream
