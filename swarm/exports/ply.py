@@ -68,9 +68,8 @@ class _PlyWriter:
         trajectory, self._chosen = chosen.trajectory, chosen
         scene, first = trajectory.scene, trajectory.frame(chosen.numbers[0])
         self._center = origin_of(scene, first)
-        # The first frame of a run with sources may hold no particle: the scale is then made from the last one.
-        shown = trajectory.frame(chosen.numbers[-1]) if np.isnan(first.position[0]).any() else first
-        self._scale, self._values = colours.colouring("speed", scene, trajectory.method, shown)
+        last = trajectory.frame(chosen.numbers[-1])
+        self._scale, self._values = colours.by_speed(scene, trajectory.method, first, last)
         self._body = trajectory.body
         self._copies = chosen.ids % trajectory.copies if trajectory.copies else None
 

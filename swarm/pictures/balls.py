@@ -1,4 +1,4 @@
-"""Balls in the plane of a scene of two dimensions, as large as they are: discs."""
+"""Balls in the plane of a scene of two dimensions, as large as they are, discs; and the size and colours of dots."""
 
 from typing import Any
 
@@ -11,6 +11,8 @@ from ..state import Floats
 
 # The edge of a disc [points], and the part of its colour.
 _EDGE, _DARK = 0.4, 0.5
+# Dots of all particles cover this many square points of a picture, a dot at least and at most.
+_DOTS, _SMALL, _LARGE = 2.5e4, 0.3, 24.0
 
 
 class Discs(EllipseCollection):
@@ -30,6 +32,11 @@ class Discs(EllipseCollection):
         rows: Any = colours_of(colour, self._count)
         self.set_facecolor(rows)
         self.set_edgecolor(_DARK * rows)
+
+
+def size_of_dots(count: int) -> float:
+    """The size of each of so many dots [square points]."""
+    return float(np.clip(_DOTS / max(1, count), _SMALL, _LARGE))
 
 
 def colours_of(colour: Any, n: int) -> Floats:

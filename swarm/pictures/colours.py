@@ -93,6 +93,20 @@ _RED, _GREEN, _BLUE = np.rint(table().T * 255.0).astype(np.uint32)
 _PACKED: Colours = _RED << 24 | _GREEN << 16 | _BLUE << 8 | 0xFF
 
 
+def named(quantity: str) -> tuple[str, str]:
+    """The name of a quantity and its unit: "speed [m/s]" has both."""
+    name, _, unit = quantity.rstrip("]").partition(" [")
+    return name, unit
+
+
+def by_speed(scene: Scene, method: Method, start: Particles, last: Particles) -> tuple[Scale, Values]:
+    """The scale of speeds in a run, and the speed as a function of positions and velocities (3, N).
+
+    The first frame of a run with sources may hold no particle: the scale is then made from the last one.
+    """
+    return colouring("speed", scene, method, last if np.isnan(start.position[0]).any() else start)
+
+
 def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[Scale, Values]:
     """The scale, and its quantity as a function of positions and velocities (3, N).
 

@@ -9,7 +9,7 @@ from matplotlib.colors import Normalize
 from ..state import Floats
 from ..triangles.shape import Shape
 from . import flat
-from .colours import Colours
+from .colours import Colours, named
 from .framed import around, eye_of, window
 from .scenery import NO_TIES, Scenery, Ties, red_green_blue
 from .speeds import are_alike
@@ -85,7 +85,7 @@ def _values_in_words(quantity: str, values: Floats) -> str:
     """The values of particles that have one colour, in words; NaN marks absent particles."""
     values = values[~np.isnan(values)]
     least, most = float(values.min()), float(values.max())
-    name, unit = _named(quantity)
+    name, unit = named(quantity)
     if name == "speed" and most == 0.0:
         return "at rest" if len(values) == 1 else "all at rest"
     if len(values) == 1:
@@ -100,13 +100,7 @@ def _colour_in_words(quantity: str, low: float, high: float, colour: Colours) ->
     far = np.abs(np.asarray(MAP(np.arange(MAP.N)))[:, :3] - red_green_blue(colour)).sum(axis=1)
     step = int(far.argmin())
     ends = [f"{low + k / MAP.N * (high - low):.4g}" for k in (step, step + 1)]
-    name, unit = _named(quantity)
+    name, unit = named(quantity)
     within = f"of at most {ends[1]}" if step == 0 else f"of at least {ends[0]}"
     text = within if step in (0, MAP.N - 1) else f"from {ends[0]} to {ends[1]}"
     return f"all at a {name} {text} {unit}".strip()
-
-
-def _named(quantity: str) -> tuple[str, str]:
-    """The name of a quantity and its unit."""
-    name, _, unit = quantity.rstrip("]").partition(" [")
-    return name, unit

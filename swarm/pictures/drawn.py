@@ -45,6 +45,11 @@ class Drawn:
         edges, faces = (none[:, :2], none) if body is None else (_lines(body), body.faces)
         self.lines, self.triangles = self._of_all(edges), self._of_all(faces)
 
+    def noun_of(self, count: int, plane: str | None) -> str:
+        """What so many of them are: in a scene of two dimensions balls are discs."""
+        noun = self.noun if self.radius is None else "balls" if plane is None else "discs"
+        return noun if count != 1 else {"bodies": "body"}.get(noun, noun.removesuffix("s"))
+
     def points(self, rows: Floats) -> Floats:
         """The points that are shown, from positions or velocities (3, N) of all."""
         if self._body is None:

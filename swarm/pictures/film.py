@@ -146,14 +146,10 @@ class _Film:
         # Walls without an end are drawn around the particles of the first frame and of the last.
         self._around = np.concatenate([framed.most_of(one.position) for one in (start, last)], axis=1)
         self._between = dict[tuple[int, float], list[Shape]]()
-        self._noun = drawn.noun if drawn.radius is None else "balls" if self._scene.plane is None else "discs"
-        if drawn.count == 1:
-            self._noun = "body" if drawn.noun == "bodies" else self._noun.removesuffix("s")
+        self._noun = drawn.noun_of(drawn.count, self._scene.plane)
         self._changes = self._scene.moves() or self._scene.has_doors()
         self._shapes = shapes_of(self._scene, self._around)
-        # The first frame of a run with sources may hold no particle: the scale is then made from the last one.
-        shown = last if np.isnan(start.position[0]).any() else start
-        self._scale, self._values = colours.colouring("speed", self._scene, trajectory.method, shown)
+        self._scale, self._values = colours.by_speed(self._scene, trajectory.method, start, last)
         # Half a pixel is added so that round-off does not take a whole one away.
         dpi = _DPI * min(1.0, min(pixels) / _ROOM)
         self.picture = style.picture((pixels[0] + 0.5) / dpi, (pixels[1] + 0.5) / dpi)

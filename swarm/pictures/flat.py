@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from ..state import Floats
 from ..surfaces.plane import along, shown_as
 from ..triangles.shape import Shape
-from .balls import Discs
+from .balls import Discs, size_of_dots
 from .framed import near_most
 from .style import CAVITY, CAVITY_LINE, SOLID, SOLID_LINE
 from .triad import INK, say_beyond
@@ -54,15 +54,14 @@ def flat(
     low, high = ends_in_plane(across, found)
     room = _ROOM * float((high - low).max())
     drawn = draw_walls(axes, across, shapes, float((high - low).max()))
-    dot = float(np.clip(2.5e4 / max(1, len(points)), 0.3, 24.0))
     dots: Any = None
+    at = shown_as(across, points)
     if radius is None:
-        dots = axes.scatter(*shown_as(across, points).T, c=colour, s=dot, linewidths=0.0, zorder=2)
+        dots = axes.scatter(*at.T, c=colour, s=size_of_dots(len(points)), linewidths=0.0, zorder=2)
     else:
-        dots = Discs(axes, shown_as(across, points), radius, colour)
+        dots = Discs(axes, at, radius, colour)
     low, high = low - room, high + room
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    at = shown_as(across, points)
     say_beyond(axes, int(((at < low) | (at > high)).any(axis=1).sum()))
     parts = (high - low) / (high - low).max()
     for axis, k, part in zip((axes.xaxis, axes.yaxis), along(across), parts.tolist(), strict=True):

@@ -145,9 +145,7 @@ def _places(figure: Any, content: Content, name: str, shapes: list[Shape], most:
     end = content.inside(name)
     drawn = Drawn(len(end), content.body, most, end.radius)
     start = content.frames.get("start", content.frames[name])
-    # The first frame of a run with sources may hold no particle: the scale is then made from the last one.
-    start = end if np.isnan(start.position[0]).any() else start
-    scale, values = colours.colouring("speed", content.scene, content.method, start)
+    scale, values = colours.by_speed(content.scene, content.method, start, end)
     position, packed, tints = drawn.coloured(end, scale, values)
     across = content.scene.across()
     axes = figure.add_subplot()
@@ -167,9 +165,8 @@ def _places(figure: Any, content: Content, name: str, shapes: list[Shape], most:
     here = drawn.shown if content.body else int((~np.isnan(position[0])).sum())
     count -= sum(left.values())
     count_text = many(count) if here == count else f"{many(here)} of {many(count)}"
-    noun = drawn.noun if end.radius is None else "balls" if content.scene.plane is None else "discs"
-    noun = noun if count != 1 else {"bodies": "body"}.get(noun, noun.removesuffix("s"))
-    title = f"{count_text} {noun}{' inside' * bool(left)}, t = {amount(float(content.seen['time'][-1]), 's')}"
+    noun, time = drawn.noun_of(count, content.scene.plane), amount(float(content.seen["time"][-1]), "s")
+    title = f"{count_text} {noun}{' inside' * bool(left)}, t = {time}"
     if (alike := speeds.of_all(content)) is not None:
         title += f",\neach with {amount(alike, 'm/s')}" if alike else ", all at rest"
     if left:

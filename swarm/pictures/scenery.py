@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..state import Floats
 from ..triangles.curves import finer, joined, runs, turning, zeros
 from ..triangles.shape import Shape
-from .balls import colours_of
+from .balls import colours_of, size_of_dots
 from .colours import Colours
 from .eye import Eye
 from .framed import eye_of, window
@@ -28,8 +28,6 @@ _ROOM, _FINE, _MOST = 0.025, 1.5, 1600.0
 _ON = 0.006
 # The part of its colour that a cavity has where it faces the eye, and where it turns away.
 _CLEAR, _TINTED = 0.30, 0.95
-# Dots of all particles cover this many square points of a picture, a dot at least and at most.
-_DOTS, _SMALL, _LARGE = 2.5e4, 0.3, 24.0
 Ties = tuple[Floats, Colours]
 NO_TIES: Ties = np.empty((0, 0, 3)), np.empty(0, np.uint32)
 # Triangles that are nearly parallel to the way to the eye turn away from it by round-off only.
@@ -97,9 +95,10 @@ class Scenery:
             self._show(self.opaque, 1.5)
         for shape in self.shapes:
             if shape.solid and not shape.many:
-                lines = self._cut(shape.edges + silhouette(shape, self.eye), self.opaque)
-                self._lines(lines, SOLID_LINE, 0.9, 1.0, 1.6, self.still)
-                self._lines(self._cut(shape.levels, self.opaque), SOLID_LINE, 0.4, 0.6, 1.6, self.still)
+                edges, levels = shape.edges + silhouette(shape, self.eye), shape.levels
+                for curves, wide, alpha in ((edges, 0.9, 1.0), (levels, 0.4, 0.6)):
+                    seen = self._cut([self._fine(curve) for curve in curves])
+                    self._lines(seen, SOLID_LINE, wide, alpha, 1.6, self.still)
 
     def _sorted(self) -> tuple[list[tuple[list[Floats], str, float, float]], list[Floats]]:
         """The lines of cavities that are behind particles, and those that are before them."""
@@ -133,13 +132,9 @@ class Scenery:
         far[:, 2] = -np.finfo(np.float64).max
         return self._back.hides(far)
 
-    def _cut(self, curves: list[Floats], raster: Raster) -> list[Floats]:
-        """The parts of curves that are not hidden."""
-        found = []
-        for curve in curves:
-            seen = self._fine(curve)
-            found += runs(seen, ~raster.hides(seen, self._on))
-        return found
+    def _cut(self, curves: list[Floats]) -> list[Floats]:
+        """The parts of curves, as they are seen, that nothing opaque hides."""
+        return [run for seen in curves for run in runs(seen, ~self.opaque.hides(seen, self._on))]
 
     def _fine(self, curve: Floats) -> Floats:
         """A curve as it is seen, with points so near to each other that it can be cut."""
@@ -153,10 +148,7 @@ class Scenery:
 
     def near_lines(self) -> None:
         """Draw what is before the particles: the near edges of cavities."""
-        self._lines(self._cut_seen(self._near_curves), CAVITY_LINE, 0.8, 0.7, 4.0, self.front)
-
-    def _cut_seen(self, curves: list[Floats]) -> list[Floats]:
-        return [run for seen in curves for run in runs(seen, ~self.opaque.hides(seen, self._on))]
+        self._lines(self._cut(self._near_curves), CAVITY_LINE, 0.8, 0.7, 4.0, self.front)
 
     def _lines(self, curves: list[Floats], colour: Any, wide: float, alpha: float, order: float, to: list[Any]) -> None:
         if curves:
@@ -206,10 +198,8 @@ class Scenery:
         """Dots of those that no solid hides, the nearer ones before others."""
         kept = np.flatnonzero(~self.opaque.hides(seen))
         kept = kept[np.argsort(seen[kept, 2])]
-        size = float(np.clip(_DOTS / max(1, count), _SMALL, _LARGE))
-        return self.axes.scatter(
-            *seen[kept, :2].T, c=colours_of(colour[kept], len(kept)), s=size, linewidths=0.0, zorder=2.0
-        )
+        tints, size = colours_of(colour[kept], len(kept)), size_of_dots(count)
+        return self.axes.scatter(*seen[kept, :2].T, c=tints, s=size, linewidths=0.0, zorder=2.0)
 
     def _bonds(self, lines: Floats, packed: Colours) -> list[Any]:
         """The lines of bodies, wider the fewer there are."""

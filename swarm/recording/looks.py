@@ -121,7 +121,7 @@ def log_about(stream: Any, drawn: Drawn, scale: Scale, stride: int, center: Floa
     """Log the meaning of the colours, what is shown of how many, the origin, and the plane of two dimensions."""
     of = f" of {many(drawn.count)}" if drawn.shown < drawn.count else ""
     every = f", every {stride}th frame" if stride > 1 else ""
-    name, _, unit = scale.quantity.rstrip("]").partition(" [")
+    name, unit = colours.named(scale.quantity)
     text = (
         f"**{many(drawn.shown)}{of} {drawn.noun}{every}**, coloured by {name}: {scale.low:g} (dark blue) to "
         f"{scale.high:g} {unit}".rstrip()
