@@ -18,9 +18,10 @@ from ..surfaces.surface import shown
 
 # Balls overlap by round-off of their places at the start: this many times that of the largest coordinate.
 _ROUND_OFF = 64.0 * np.finfo(np.float64).eps
-# Of that coordinate, how far balls that touch walls are moved to see what keeps them, and a step of their distances.
+# Balls that touch walls are moved by the first part of that coordinate, to find the walls that stop them; the second is
+# the step of differences of their distances.
 _MOVED, _STEP = 1e-6, 1e-7
-# The cosine, less 1, of the normals of walls between which a ball has no room.
+# Walls face each other where the cosine of the angle between their normals is less than this above -1.
 _FACING = 1e-6
 
 

@@ -26,25 +26,25 @@ from .colliding.clock import EVENTS, LENGTH
 
 # The radii grow by this part of the root of the mean square of the speed of balls: slowly, so that the balls spread.
 _SLOW = 0.04
-# By so much of the last radius at a time; then the balls, which gain energy, are as fast as before.
+# They grow by this part of the last radii at a time; then the balls, which gain energy, get their first speed again.
 _STAGE = 0.02
-# Events a ball of such a part after which the balls give way no more: at a packing of 0.6 there are 100.
+# Balls are jammed after so many events a ball in one of these parts: at a packing of 0.6 there are 100.
 _JAMMED = 2000
-# A length that no epoch reaches [s].
+# The length of an epoch that does not end [s].
 _FOREVER = 1e100
-# And so much they are wider at the end, so that they are apart by more than round-off.
+# At the end they are wider by this part, so that they are apart by more than round-off.
 _WIDER = 1e-9
 
 
 class GrowingSight(NamedTuple):
-    """As `Sight`, of balls that grow: what b.u and |u|^2 are there is less what the distance of contact grows by."""
+    """The `Sight` of balls that grow: b.u and |u|^2 are less by the terms of the growth of the contact distance."""
 
     closing: Any
     gap: Any
     discriminant: Any
 
     def meets(self):
-        """Whether they will touch: slower than they grow they do, whatever their way is."""
+        """Whether they will touch: always if they fly apart more slowly than they grow."""
         slow = (self.gap > 0.0) & (self.discriminant > self.closing * self.closing)
         return ((self.closing < 0.0) | slow) & (self.discriminant > 0.0)
 

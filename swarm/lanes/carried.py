@@ -19,13 +19,13 @@ from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, put, square, 
 
 # The phase of a particle that these walls do not carry.
 NOT_CARRIED = -1
-# The volume that three unit normals span, below which they hold no point.
+# Three walls hold no point where their unit normals span a volume below this.
 _FLATTEST = 1e-6
 # A relative speed below this fraction of the particle's own speed is zero if no wall loses energy.
 _NO_SPEED = 1e-13
 # Sweeps until a point is on three walls: one where they are flat.
 _SWEEPS = 20
-# Round-off of a velocity that three walls say, over the sum of theirs, where their normals are orthogonal.
+# The round-off of the velocity of a corner, relative to the sum of the speeds of its walls, if these are orthogonal.
 _NO_SLIP = 8.0 * EPSILON
 # A step that ends where a wall does not press is tried again so much shorter; one to another wall is cut so often.
 _RETRY, _MOST_TRIES = 0.25, 100

@@ -36,7 +36,7 @@ _STEPS = 100
 # The bounds of a flight hold for at most so many times the time in which the motion changes little: a turn by a radian
 # and a quarter.
 _LONGEST = 25.0
-# A part of the room of a facet, by which a flight goes on that comes to its plane just beyond an edge.
+# A flight that comes to the plane of a facet just beyond an edge goes on by this part of the facet's room.
 _ON = 0.5
 # Lanes take so many safe steps to facets side by side, as most need no more.
 _TOGETHER = 5

@@ -24,11 +24,11 @@ from .window import HELD, walls_at
 FLIES, GONE, STAYS = Status.DONE.value, -1, -2
 # Of a radius, how far a closed wall may be from a ball that an open one lets out.
 _TOUCH = 1e-9
-# Of its speed, that with which a ball leaves a wall at least: four roundings.
+# A ball leaves a wall with at least this part of its speed: four roundings.
 _PARTS = 2.0**-50
-# And at most, where a wall bends away under it.
+# Where the wall bends away under it, with no more than this part.
 _ENOUGH = 0.25
-# By so much more is surely more, for all round-off.
+# A bound that is exceeded by this factor is exceeded whatever round-off does.
 _SURELY = 1.01
 
 
@@ -55,7 +55,7 @@ def bounce(box, flock, books, clock, i, now):
         wall = closed
     after = _turned(box, flock, books, walls, wall, (i, now, r, v))
     owner = box.owner(wall)
-    row = index(int(walls.row(wall) if box.rows is None else box.rows[index(int(wall))]))
+    row = box.row(walls, wall)
     heat = book(box.laws, books, (row, 0, index(i)), box.kinds.mass_of(i), after)
     if box.watchers.counts is not None:
         box.watchers.counts.give(owner, heat, after.wait)
@@ -77,7 +77,7 @@ def bounce(box, flock, books, clock, i, now):
 def press(box, flock, books, i, now, impulse):
     """Book what a wall gets of the impulse on a ball that it holds, along its normal [N s]."""
     wall, walls = HELD - flock.wall(i), walls_at(box, i, now)
-    row = index(int(walls.row(wall) if box.rows is None else box.rows[index(int(wall))]))
+    row = box.row(walls, wall)
     books.impulse[row, 0] += dot(walls.unit_normal(wall, flock.place(i)), impulse)
 
 
@@ -98,10 +98,8 @@ def _end(box, flock, clock, wall, i, now, after):
     elif after.wait > 0.0:
         ended = Status.WAITS.value if flock.holds is None else STAYS
         if box.gates is not None and box.gates.absorbed_time is not None and after.wait == math.inf:
-            box.gates.absorbed_time[index(i)], box.gates.absorbed_wall[index(i)] = (
-                moment_of(clock, now),
-                np.int32(box.owner(wall)),
-            )
+            box.gates.absorbed_time[index(i)] = moment_of(clock, now)
+            box.gates.absorbed_wall[index(i)] = np.int32(box.owner(wall))
             ended = GONE
     return ended
 
@@ -138,10 +136,10 @@ def _turned(box, flock, books, walls, wall, ball):
 
 @outlined
 def _lifted(box, walls, wall, r, turned):
-    """The same, so fast away from the wall that what pulls the ball back takes the shortest flight to do so.
+    """The same `Bounce`, but at least so fast away from the wall that the flight back to it takes `box.shortest`.
 
-    What it gets so is a loss below 0, which the next impact takes back; along the wall nothing changes. Where nothing
-    is lost, it is turned, with the speed that it has.
+    The energy that the ball gains so is booked as a loss below 0, which the next impact takes back. The velocity along
+    the wall stays. Where walls lose no energy, the velocity is turned instead, and the speed stays.
     """
     u = wall_velocity(box.laws.moving, walls, wall, r)
     w, pull = relative(u, turned.v), accelerated(box.pull, ZERO, 1.0)

@@ -27,11 +27,15 @@ class Domain(Record):
     repose: Any = None  # None, or `Repose` where balls may come to rest
     turning: Any = None  # None, or `BallSpins` of balls that have a spin
     owners: Any = None  # the number in the scene of each wall without a mass; None if no wall has a mass
-    rows: Any = None  # and its row of the books
+    rows: Any = None  # the row in the books of each wall without a mass; None if no wall has a mass
 
     def owner(self, wall):
         """The number of a wall in the scene."""
         return wall if self.owners is None else float(self.owners[index(int(wall))])
+
+    def row(self, walls, wall):
+        """The row of the books of one of these walls."""
+        return index(int(walls.row(wall) if self.rows is None else self.rows[index(int(wall))]))
 
 
 class CollisionTotals(NamedTuple):

@@ -15,7 +15,7 @@ def moment_of(clock, now):
 
 
 def fit(clock, speed2):
-    """Fit the length of epochs to the mean square of the speed: halve it, or double it, and ends stay as they are."""
+    """Halve or double the length of epochs to fit the mean square of the speed; their ends stay where they are."""
     way2 = speed2 * clock[LENGTH] * clock[LENGTH]
     reach2 = clock[REACH] * clock[REACH]
     is_even = 2.0 * math.floor(0.5 * clock[EPOCHS]) == clock[EPOCHS]

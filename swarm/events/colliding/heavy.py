@@ -1,7 +1,8 @@
 """Walls with a mass among balls: the balls near them, and when these meet them if nothing strikes the walls before.
 
-A ball that is far is looked at again after a time in which it surely meets none, whatever others do to the walls within
-their leases. What is known of one that is near holds until a wall is struck. All look again where a lease ends.
+A ball that is far from them is looked at again after a time in which it surely meets none, whatever impacts do to the
+walls within their leases. The next hit of a ball that is near holds until a wall is struck. All are looked at again
+when a lease ends.
 """
 
 import math

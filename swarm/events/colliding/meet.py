@@ -18,10 +18,10 @@ class Loss(Record):
     """The loss of energy in collisions."""
 
     restitution: float
-    duration: float  # t_c [s]: a ball that met another ball less than this before loses no energy
+    duration: float  # t_c [s]: a ball that met another one less than this ago loses no energy
 
     def spares(self, flock, i, now):
-        """Whether a ball loses no energy now, neither to a ball nor to a wall."""
+        """Whether a ball loses no energy in an impact now, on a ball or on a wall."""
         return now - flock.last[index(i)] < self.duration
 
 
@@ -44,9 +44,9 @@ def turned(u, n, closing, distance2, restitution):
 
 
 def _parted(u, b, distance2, speed2):
-    """A relative velocity that parts two balls so fast that their own velocities, |v|^2 + |w|^2, have digits of it.
+    """A relative velocity that parts two balls by at least the round-off of their own speeds, |v|^2 + |w|^2.
 
-    Else those that touch and fly on together would collide without end by what is round-off of their velocities.
+    Without this, two balls that touch and fly on together would collide without end.
     """
     away, least2 = dot(b, u), _PARTS * speed2 * distance2
     slow = (away < 0.0) | (away * away < least2)

@@ -97,7 +97,7 @@ def _book(box, books, i, blow):
 
 @outlined
 def _look_again(box, flock, now):
-    """After a strike: those that are near look for their next wall."""
+    """Find the next wall of each ball that is near, after a strike."""
     heavy = box.heavy
     count = int(heavy.counts[LISTED])
     heavy.counts[LISTED] = 0.0
@@ -135,7 +135,7 @@ def renew_leases(box, flock, clock, now):
 
 
 def renew_ended(box, flock, clock, end):
-    """New leases at the times at which they end before the next event, and before the frame ends."""
+    """Renew the leases that end before the next event and before the end of the frame, each at its end."""
     until = min(box.heavy.freedoms.until)
     last = end if box.window is None else min(end, box.window[END])
     while until <= flock.key[FIRST] and until < last:

@@ -1,7 +1,7 @@
 """The ways in which a wall that reacts may move: freely without turning, along a guide, on a spring, about an axis.
 
-Between two impacts its motion is known. What impacts may make of it is bounded by a lease: until the wall has left it,
-the velocity stays within a width of a middle one, so that what was said of far particles holds.
+Between two impacts its motion is known. A lease bounds what impacts do to it: until the wall leaves the lease, its
+velocity stays within a width of a middle one, so that bounds of the times of far particles hold.
 """
 
 import math
@@ -20,8 +20,8 @@ from ...surfaces.time_of_impact import flights, safe
 from ...surfaces.time_of_impact.rising import flight_of
 from ...surfaces.walls import Field, Walls
 
-# The first leases have this part of the particles' speed as their width. They are too narrow where they end before so
-# many events a particle, and too wide where they last longer than that many.
+# The width of the first leases, relative to the particles' speed. Leases that end before the second number of events a
+# particle are too narrow; those that last for more than the third are too wide.
 WIDTH, TOO_SHORT, TOO_LONG = 0.1, 4.0, 32.0
 
 
@@ -53,7 +53,7 @@ class ParticleFlight(NamedTuple):
 
 
 class Lease(Record):
-    """A particle in the frame that moves with the middle velocity of a lease, which the wall leaves by little.
+    """A particle in the frame that moves with the middle velocity of a lease: the wall is nearly at rest there.
 
     There the wall stays within the width times the time of where it is: for a plane and a ball the first time at which
     a flight is as near as that is the root of a parabola.
@@ -167,7 +167,7 @@ class Freedom(Record):
         raise NotImplementedError
 
     def keeps(self, walls, more):
-        """The time that the wall stays in its lease [s] by its pull, while its velocity may change by so much more."""
+        """How long its pull leaves the wall in its lease [s], if its velocity may change by `more`."""
         raise NotImplementedError
 
     def renew(self, walls, t):
@@ -177,7 +177,7 @@ class Freedom(Record):
         walls.until[k] = t + self.keeps(walls, walls.width[k])
 
     def stays(self, walls):
-        """Whether a wall that was just struck is within its lease; says until when."""
+        """Whether a wall that was just struck is within its lease; stores until when it is."""
         k, away = index(self.row), self.away(walls)
         walls.until[k] = walls.time[k] + self.keeps(walls, walls.width[k] - away)
         return away < walls.width[k]

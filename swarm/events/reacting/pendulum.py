@@ -1,7 +1,7 @@
 """Walls that turn about an axis: freely, or by their weight, as theta'' = -k sin(theta - rest).
 
-From one lease to the next the angle of a pendulum is its Taylor polynomial. Its radius of convergence is above
-1/(sqrt(k) + |rate|), of which a lease lasts a part so small that the last term is round-off.
+Within a lease the angle of a pendulum is its Taylor polynomial. The radius of convergence is above
+1/(sqrt(k) + |rate|); a lease lasts for so small a part of this that the last term is round-off.
 """
 
 import math
@@ -45,7 +45,7 @@ class Turning(Freedom):
         return abs(walls.rate[k] - walls.turning[k])
 
     def reach(self: Any, body, walls, flight):
-        # No point of the wall within the arm and the clearance is faster than the rate says.
+        # No point of the wall within |arm| + clearance of the axis is faster than the rate times that distance.
         k = index(self.row)
         arm, turn = self.arm(flight.r), self.pose(walls, flight.time).turn
         own = self.center + turn.x * arm.x + turn.y * arm.y + turn.z * arm.z
@@ -191,7 +191,7 @@ class Pendulum(Turning):
         return min(more / most, _PART / (math.sqrt(most) + abs(rate)))
 
     def hit(self, body, gravity, walls, flight):
-        # What comes after the lease is asked again then.
+        # The flight is looked at again when the lease ends.
         longest = min(flight.longest, max(walls.until[index(self.row)] - flight.time, 0.0))
         return march(self.swaying(body, walls, flight, longest), flight, longest)
 

@@ -118,7 +118,7 @@ def _waits(queue, i):
 
 
 def _set_out(scenery, queue, i, rule):
-    """Particle i at the start of a frame, which it flies from there, or later."""
+    """Set the times of particle i at the start of a frame; it flies from there, or from a later birth or release."""
     queue.time[i], queue.hits[i] = 0.0, 0
     if is_gone(queue, i):
         return
@@ -152,7 +152,7 @@ def _seen(scenery, queue, i, now, end):
 
 
 def _next(scenery, walls, queue, i, now, end, soon):
-    """The time at which something may happen to particle i: by its reach if that is far, else as it is now."""
+    """The time of the next event of particle i; of one far from all walls that react, when it may first reach one."""
     if is_gone(queue, i):
         queue.near[i], queue.struck[i] = False, NONE
         return math.inf
@@ -363,9 +363,8 @@ def _listed(queue):
 def take(scenery, freedoms, queue, clock, rule):
     """Take event after event until the end of the frame: (status, particle).
 
-    LEASE_ENDED at the time of the clock: call `lease` and `predict`, and then this again. LOG_FULL: give it an empty
-    log, and call it again. INTERRUPTED after so many
-    events as the rule says; it goes on with the same bits.
+    LEASE_ENDED at the time of the clock: call `lease` and `predict`, and then this again. LOG_FULL: call it again with
+    an empty log. INTERRUPTED after as many events as the rule says: the next call goes on with the same bits.
     """
     heap, end, taken = queue.heap, rule.end, 0
     build(heap)
