@@ -74,10 +74,14 @@ def test_a_page_needs_no_network_and_logs_nothing(run):
     assert page.count("<svg") >= 3
 
 
-def rows(values):
-    """Rows of a table whose energies are these; that of None is not known."""
-    cells = [("", "") if value is None else (f"{value:.3g}", repr(value)) for value in values]
-    return [[(f"{k}.h5", ""), cell] for k, cell in enumerate(cells)]
+def sweep_with(energies):
+    """The page of a sweep with a row for each of these energies; that of None is not known."""
+    cells = [("", "") if value is None else (f"{value:.3g}", repr(value)) for value in energies]
+    return filled(
+        "sweep.html.j2", title="Sweep", about="", notes=[], failures=[], columns=["file", "energy"],
+        rows=[[(f"{k}.h5", ""), cell] for k, cell in enumerate(cells)], table=None, left_out=0, graphs=[], worst=[],
+        sweep_file="", command="", name="sweep",
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -86,25 +90,16 @@ def rows(values):
 )
 def test_the_table_of_a_sweep_is_sorted(tmp_path, asked, order):
     page = tmp_path / "sweep.html"
-    html = filled(
-        "sweep.html.j2", title="Sweep", about="", notes=[], failures=[], columns=["file", "energy"],
-        rows=rows([2.0, None, 10.0, -1.0]), table=None, left_out=0, graphs=[], worst=[], sweep_file="", command="",
-        name="sweep",
-    )  # fmt: skip
-    page.write_text(html)
+    page.write_text(sweep_with([2.0, None, 10.0, -1.0]))
     document = browser(tmp_path, "--dump-dom", page.as_uri() + asked)
     assert [int(k) for k in re.findall(r'data-value="(\d)\.h5"', document)] == order
     assert len(re.findall(r"<th [^>]*aria-sort", document)) == (asked != "")
 
 
 def test_a_click_sorts_too(tmp_path):
-    html = filled(
-        "sweep.html.j2", title="Sweep", about="", notes=[], failures=[], columns=["file", "energy"],
-        rows=rows([2.0, 1.0]), table=None, left_out=0, graphs=[], worst=[], sweep_file="", command="", name="sweep",
-    )  # fmt: skip
     clicks = "<script>for (let k = 0; k < 2; k++) document.querySelectorAll('th button')[1].click();</script></body>"
     page = tmp_path / "sweep.html"
-    page.write_text(html.replace("</body>", clicks))
+    page.write_text(sweep_with([2.0, 1.0]).replace("</body>", clicks))
     document = browser(tmp_path, "--dump-dom", page.as_uri())
     assert 'aria-sort="descending"' in document
     assert [int(k) for k in re.findall(r'data-value="(\d)\.h5"', document)] == [0, 1]
