@@ -5,17 +5,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...kernel.gravity import as_vector
+from ...kernel.gravity import as_vector, rise_time
 from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
-from ...kernel.vector import Symmetric, Vec, dot, largest, square
+from ...kernel.vector import Symmetric, Vec, absolute, dot, largest, square, total
 from .. import contract
-from ..time_of_impact.course import positive
-from ..time_of_impact.looks import Straight, falling, first_found
+from ..time_of_impact.course import Majorant, positive
+from ..time_of_impact.looks import FallByLooks, FallToBox, Straight, falling, first_found
 
 # Points this close, relative to the size, are joined by Gauss's rule, with an error of the 7th power; its outer node.
 _SHORT = 1e-2
 _NODE = 0.5 * math.sqrt(0.6)
+_ONE = np.float64(1.0)
 
 
 class Bend(NamedTuple):
@@ -64,6 +65,30 @@ def _between(low, high, x, v):
     before, after = select(a < b, a, b), select(a < b, b, a)
     always = select(within, math.inf, -math.inf)
     return select(still, -always, before), select(still, always, after)
+
+
+class _Face(Majorant):
+    """How far within a face of a box a fall is, c + 2 b t + a2 t^2 below 0 beyond it, and when it comes to the face."""
+
+    c: float
+    b: float
+    a2: float
+    time: float
+
+
+def _face(low, high, x, v, pull):
+    """The face beyond which a coordinate is, or any if it is beyond none."""
+    below = x - low < high - x
+    # Numbers of NumPy: in plain Python no other quotient by 0 is infinite.
+    sign = select(below, _ONE, -_ONE)
+    c, b, a2 = select(below, x - low, high - x), 0.5 * sign * v, 0.5 * sign * pull
+    return _Face(c, b, a2, select(c < 0.0, rise_time(c, b, a2), 0.0))
+
+
+def _later(one, other):
+    """The face that a fall comes to later."""
+    later = one.time >= other.time
+    return _Face(*(select(later, a, b) for a, b in zip(one, other, strict=True)))
 
 
 class OwnNumbers(contract.Smooth):
@@ -118,7 +143,7 @@ class OwnNumbers(contract.Smooth):
         if self.closed == 0.0:
             return most, magnitude, self.size
         out = self._outside(r)
-        return most, magnitude, select(out > 0.5 * self.margin, out, min(self.margin - out, self.size))
+        return most, magnitude, select(out > 0.5 * self.margin, out, min(self.known_around(r), self.size))
 
     def clearance(self, r):
         return select(self.closed > 0.0, max(self._outside(r), 0.0), 0.0)
@@ -126,9 +151,21 @@ class OwnNumbers(contract.Smooth):
     def _outside(self, r):
         """The distance outside the box, by its largest component; below 0 inside."""
         d = r - self.center
-        across = max(self.low.x - d.x, d.x - self.high.x)
-        across = max(across, self.low.y - d.y, d.y - self.high.y)
-        return max(across, self.low.z - d.z, d.z - self.high.z)
+        low, high = self.low - d, d - self.high
+        across = _larger(_larger(low.x, high.x), _larger(low.y, high.y))
+        return _larger(across, _larger(low.z, high.z))
+
+    def known_around(self, r):
+        """How far around a place the bend of a solid is surely known; below 0 where it is not known at the place."""
+        return self.margin - self._outside(r)
+
+    def last_face(self, r, v, pull):
+        """(the face of the box that a fall comes to last, whether it is beyond it)."""
+        d, low, high = r - self.center, self.low, self.high
+        coordinates = total(absolute(r)) + total(absolute(self.center))
+        face = _later(_face(low.x, high.x, d.x, v.x, pull.x), _face(low.y, high.y, d.y, v.y, pull.y))
+        face = _later(face, _face(low.z, high.z, d.z, v.z, pull.z))
+        return face, face.c < -4.0 * EPSILON * coordinates
 
     @outlined
     def first_hit(self, r, v):
@@ -162,6 +199,7 @@ class SmoothCavity(OwnNumbers):
 
     in_steps = True
     looked_at = True
+    falls = FallByLooks
 
     def steps(self, gravity, r, v):
         return self.straight(r, v) if gravity is None else falling(self, as_vector(gravity), r, v)
@@ -177,11 +215,7 @@ class SmoothCavity(OwnNumbers):
 class SmoothSolid(SmoothCavity):
     """The same of a solid."""
 
-    def steps(self, gravity, r, v):
-        return self.straight(r, v) if gravity is None else None
-
-    def falling_hit(self, r, v, pull):
-        return OwnNumbers.falling_hit(self, r, v, pull)
+    falls = FallToBox
 
     def span(self, r, v):
         return self._in_box(r, v)

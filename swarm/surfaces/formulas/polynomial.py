@@ -3,15 +3,13 @@
 import math
 from typing import Any
 
-import numpy as np
-
-from ...kernel.gravity import Gravity, accelerated, as_vector, displacement, rise_time, rise_time_by, rise_time_inside
+from ...kernel.gravity import Gravity, accelerated, as_vector, displacement, rise_time_by, rise_time_inside
 from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import absolute, dot, norm, square, total
 from ..balls.foot_hit import applied
 from ..time_of_impact.approach import AimedApproach, Approach, LevelBound
-from ..time_of_impact.course import Majorant, Quartic, first_rise, level_and_window
+from ..time_of_impact.course import Quartic, first_rise, level_and_window
 from ..time_of_impact.polynomial import ConvexFlight, PolynomialFall, PolynomialFlight
 from .numbers import OwnNumbers, SmoothCavity, SmoothSolid
 
@@ -23,31 +21,6 @@ _ROUND_OFF = 1e-13
 _REFINED = 1e-4
 # b^2 - a c has lost digits where it is less than this part of b^2.
 _CANCELS = 1.0 / 64.0
-_ONE = np.float64(1.0)
-
-
-class _Face(Majorant):
-    """How far within a face of a box a fall is, c + 2 b t + a2 t^2 below 0 beyond it, and when it comes to the face."""
-
-    c: float
-    b: float
-    a2: float
-    time: float
-
-
-def _face(low, high, x, v, pull):
-    """The face beyond which a coordinate is, or any if it is beyond none."""
-    below = x - low < high - x
-    # Numbers of NumPy: in plain Python no other quotient by 0 is infinite.
-    sign = select(below, _ONE, -_ONE)
-    c, b, a2 = select(below, x - low, high - x), 0.5 * sign * v, 0.5 * sign * pull
-    return _Face(c, b, a2, select(c < 0.0, rise_time(c, b, a2), 0.0))
-
-
-def _later(one, other):
-    """The face that a fall comes to later."""
-    later = one.time >= other.time
-    return _Face(*(select(later, a, b) for a, b in zip(one, other, strict=True)))
 
 
 class PolynomialNumbers(OwnNumbers):
@@ -215,12 +188,8 @@ class QuarticSolid(QuarticCavity):
 
     def near(self, gravity, r, v):
         # Outside its box there is no wall, whatever phi is there: a fall comes to each face that it is beyond.
-        level, pull = self._near(gravity, r, v), as_vector(gravity)
-        d, low, high = r - self.center, self.low, self.high
-        coordinates = total(absolute(r)) + total(absolute(self.center))
-        face = _later(_face(low.x, high.x, d.x, v.x, pull.x), _face(low.y, high.y, d.y, v.y, pull.y))
-        face = _later(face, _face(low.z, high.z, d.z, v.z, pull.z))
-        beyond = face.c < -4.0 * EPSILON * coordinates
+        level = self._near(gravity, r, v)
+        face, beyond = self.last_face(r, v, as_vector(gravity))
         return level._replace(
             c=select(beyond, face.c, level.c), b=select(beyond, face.b, level.b), a2=select(beyond, face.a2, level.a2),
             higher=tuple(select(beyond, 0.0, one) for one in level.higher),

@@ -40,6 +40,8 @@ class LevelSeen(Record):
     rises: Any
     # Whether round-off decides if the flight, which leaves the wall, has left it
     lets_go: Any
+    ends: Any  # whether a flight that is free until then is so for ever
+    meets: Any = True  # whether it is the wall that the level rises at
 
 
 class FlightByLooks(Record):
@@ -49,9 +51,6 @@ class FlightByLooks(Record):
     the level rises all the way from the first root to there: it has no other root, and nothing is left to be proven.
     Looks then go to the root from both sides, by the cubic through the last two of them.
     """
-
-    # Whether a flight that is free until the end of a sight is so for ever.
-    ends = True
 
     def first(self):
         """What is known before the first look."""
@@ -73,17 +72,15 @@ class FlightByLooks(Record):
         bottom = half + math.sqrt(positive(half * half - bend * level))
         step = select(past, level / select(past, bottom, 1.0), rise_time(level, half, bend))
         beyond = not (t + step <= here.until)
-        is_free = False
-        if self.ends:
-            # Where there is one root, a look at the end says whether it is before that.
-            is_free = (not past) & ((beyond & (not one_root)) | (t >= here.until) | (not step < math.inf))
+        # Where there is one root, a look at the end says whether it is before that.
+        is_free = here.ends & (not past) & ((beyond & (not one_root)) | (t >= here.until) | (not step < math.inf))
         # What is left of the level after the step is at most (most - least) step^2, the rise there at least this.
         way = select(is_free, 0.0, step)
         rising = half + way * select(past, -most, least)
         shortest = 2.0 * EPSILON * (total(absolute(here.place)) / select(here.speed > 0.0, here.speed, 1.0) + way)
         arrives = (not is_first) | (rising > 0.0) | (way == 0.0)
         arrives &= (way <= shortest) | ((most - least) * way * way <= 2.0 * shortest * rising)
-        arrives &= (past | (not beyond)) & (not here.lets_go)
+        arrives &= (past | (not beyond)) & (not here.lets_go) & here.meets
         free, after = select(past, known.free, t), select(past, t - way, select(beyond, here.until, t + way))
         # A level that bends more than was said has its root anywhere between.
         after = select(past & (not after > free), 0.5 * (free + t), after)
@@ -128,7 +125,7 @@ class Straight(FlightByLooks):
         p = self.r + known.at * self.v
         level = surface.side * surface.phi(p)
         half = 0.5 * surface.side * dot(surface.gradient(p), self.v)
-        return LevelSeen(p, norm(self.v), level, half, self.least, self.most, self.end, True, False)
+        return LevelSeen(p, norm(self.v), level, half, self.least, self.most, self.end, True, False, True)
 
 
 class FallByLooks(FlightByLooks):
@@ -148,8 +145,6 @@ class FallByLooks(FlightByLooks):
     most: Any
     window: Any  # the time of the first sight
 
-    ends = False
-
     def constants(self):
         """What lanes keep of it."""
         return (self.window,)
@@ -167,8 +162,8 @@ class FallByLooks(FlightByLooks):
         n, side = surface.gradient(p), surface.side
         level, half = side * surface.phi(p), 0.5 * side * dot(n, w)
         past = (level > 0.0) & (half > 0.0) & (not is_first)
-        reach = select(is_first, self.window, 2.0 * abs(t - known.before))
         speed, weight = norm(w), norm(pull)
+        reach = self._within(p, speed, select(is_first, self.window, 2.0 * abs(t - known.before)))
         bent, along = 0.5 * side * dot(n, pull), select(past, -1.0, 1.0) * dot(pull, w)
         least, most = self._bounds(square(w), bent, along, speed, reach)
         # A fall that slides on leaves the wall where that bends neither towards it nor away, see `march.lets_go`.
@@ -176,7 +171,11 @@ class FallByLooks(FlightByLooks):
         lets_go = (half < 0.0) & (level >= -slack) & (3.0 * half * half <= slack * most)
         level = select(lets_go & (level > -slack), -slack, level)
         rises = level + reach * (2.0 * half + reach * least) >= 0.0
-        return LevelSeen(p, speed + weight * reach, level, half, least, most, t + reach, rises, lets_go)
+        return LevelSeen(p, speed + weight * reach, level, half, least, most, t + reach, rises, lets_go, False)
+
+    def _within(self, place, speed, reach):
+        """The reach from a place, up to where the bounds hold."""
+        return reach
 
     def _bounds(self, speed2, bent, along, speed, reach):
         """The bounds up to a reach, as the derivative needs them: the level itself has less of the later terms."""
@@ -191,11 +190,47 @@ class FallByLooks(FlightByLooks):
         return least, most
 
 
+class FallToBox(FallByLooks):
+    """A fall at a solid in a box, of which the bounds are those within a margin around the box.
+
+    Beyond a face of the box there is no wall: a fall comes to the last of these by a parabola.
+    """
+
+    def see(self, known):
+        here, t, surface = FallByLooks.see(self, known), known.at, self.surface
+        face, beyond = surface.last_face(here.place, self.v + t * self.pull, self.pull)
+        level, half, least, most, until = (
+            select(beyond, *pair)
+            for pair in (
+                (face.c, here.level),
+                (face.b, here.half),
+                (face.a2, here.least),
+                (face.a2, here.most),
+                (math.inf, here.until),
+            )
+        )
+        return here._replace(
+            level=level,
+            half=half,
+            least=least,
+            most=most,
+            until=until,
+            rises=beyond | here.rises,
+            lets_go=here.lets_go & (not beyond),
+            ends=beyond,
+            meets=not beyond,
+        )
+
+    def _within(self, place, speed, reach):
+        longest = rise_time(-self.surface.known_around(place), 0.5 * speed, 0.5 * norm(self.pull))
+        return select(reach < longest, reach, longest)
+
+
 def falling(surface, pull, r, v):
-    """A fall inside a cavity as looks at it take it."""
+    """A fall as looks at it take it."""
     size = surface.size
     window = 2.0 * math.sqrt(size * size / (square(v) + size * norm(pull)))
-    return FallByLooks(surface, r, v, pull, surface.bends.least, surface.bends.most, window)
+    return surface.falls(surface, r, v, pull, surface.bends.least, surface.bends.most, window)
 
 
 def first_found(flight, looks=LOOKS):
