@@ -258,6 +258,11 @@ def _go_by_steps(walls, gravity, lanes, live):
             _go_on_beside(walls, gravity, lanes, some, tries, SAFE_STEPS + MORE_STEPS)
             return
         _try_on(walls, gravity, lanes, some, tries)
+    # The few that need more take it in the same pass: a flight in two parts would look like a short one.
+    if walls.are_looked_at():
+        some, left = _look_on(walls, gravity, lanes, live)
+        _go_on_beside(walls, gravity, lanes, some, 0, left)
+        return
     # Of lanes that do not step together those are marked that have no hit by a guess.
     together = _together(gravity, walls)
     for _step in range(together):
@@ -265,22 +270,23 @@ def _go_by_steps(walls, gravity, lanes, live):
             _step_on(walls, gravity, lanes, i)
     if together > 0:
         some = _mark(walls, gravity, lanes, live)
-    # The few that need more take it in the same pass: a flight in two parts would look like a short one.
-    if walls.are_looked_at():
-        some, left = _look_on(walls, gravity, lanes, live, some)
-        _go_on_beside(walls, gravity, lanes, some, 0, left)
-        return
     for k in range(some):
         _go_on(walls, gravity, lanes, lanes.order[k])
 
 
-def _look_on(walls, gravity, lanes, live, some):
-    """More looks of all lanes while many need them: (how many lanes need more, the looks that are left to them)."""
-    left = MORE_STEPS
+def _look_on(walls, gravity, lanes, live):
+    """Looks of all lanes while many need them: (how many lanes need more, the looks that are left to them)."""
+    left, some = SAFE_STEPS + MORE_STEPS, live
+    if not all(wall.looked_at for wall in walls.each):
+        # Many flights meet another wall before they come near to one that is looked at.
+        some = _mark(walls, gravity, lanes, live)
     while left > 0 and _LOOK * some >= live:
-        for i in range(index(live)):
-            _step_on(walls, gravity, lanes, i)
-        left, some = left - 1, _mark(walls, gravity, lanes, live)
+        # Where all lanes need looks, one more will not do.
+        looks = min(SAFE_STEPS if some == live else 1, left)
+        for _look in range(looks):
+            for i in range(index(live)):
+                _step_on(walls, gravity, lanes, i)
+        left, some = left - looks, _mark(walls, gravity, lanes, live)
     return some, left
 
 
