@@ -7,6 +7,7 @@ bits. No branches, and loops of fixed length: a lane loop vectorises.
 import math
 from typing import Any, NamedTuple
 
+from .exponential import logarithm_of
 from .jit import select
 from .record import Record
 from .vector import Vec, cross
@@ -20,14 +21,10 @@ _WORD = 0xFFFFFFFF
 # The blocks of an event's counter that `uniforms` takes, and those of each law.
 _BLOCKS, _LAW = 2, 1 << 20
 
-_HALF_ROOT = 0.7071067811865476  # sqrt(1/2)
-# ln 2 in two parts: the first has 32 bits, so that its product with an exponent is exact.
-_LN2_HIGH, _LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
 _HALF_PI = 1.5707963267948966
 # (2^k, k): a number below 2^-k is scaled by 2^k, and then is below 1 still.
 _SCALES = tuple((float(1 << k), float(k)) for k in (32, 16, 8, 4, 2, 1))
-# 2/3, 2/5, ...: of 2 artanh(s) less its first term, from the last. Of the rest of a sine and a cosine likewise.
-_ARTANH = tuple(2.0 / n for n in range(21, 1, -2))
+# Of the rest of a sine and a cosine, from the last.
 _SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(8, 0, -1))
 _COSINE = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(8, 1, -1))
 # Adding it and taking it away rounds a small float to an integer, ties to even.
@@ -125,24 +122,12 @@ class Stream(Record):
 
 
 def logarithm(u):
-    """ln u for u in [2^-63, 1], to one unit in the last place.
-
-    u = 2^e (1 + f) with 1 + f within sqrt(1/2)..sqrt(2), and ln(1 + f) = 2 artanh(s) for s = f/(2 + f): with 2 s =
-    f - s f that is f - s (f - R), R = 2 s^2/3 + 2 s^4/5 + ..., |s| < 0.172; its rounding is small beside f. What is
-    left out is 2 s^22/23 < 2e-18 of R.
-    """
+    """ln u for u in [2^-63, 1], to one unit in the last place."""
     e = 0.0
     for scale, k in _SCALES:
         small = u * scale < 1.0
         u, e = select(small, u * scale, u), select(small, e - k, e)
-    small = u < _HALF_ROOT
-    f, e = select(small, u + u, u) - 1.0, select(small, e - 1.0, e)
-    s = f / (2.0 + f)
-    z = s * s
-    rest = 0.0
-    for coefficient in _ARTANH:
-        rest = z * (coefficient + rest)
-    return e * _LN2_HIGH - ((s * (f - rest) - e * _LN2_LOW) - f)
+    return logarithm_of(u, e)
 
 
 def circle(u):

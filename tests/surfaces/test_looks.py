@@ -26,9 +26,10 @@ ROOTS = "sqrt(x**2 + 0.01) + sqrt(y**2 + 0.02) + sqrt(z**2 + 0.01)*cos(3*z)**2 +
 WAVES = "x**2/0.01 + y**2/0.01 + z**2/0.02 - 1 + 0.3*sin(30*x)*sin(30*y)"
 DENTED = "x**2/0.09 + y**2/0.09 + z**6/0.01 + cos(8*x)*cos(8*y)*sin(9*z) - 1"
 SOLIDS = WAVES, DENTED
+LIBRARY = "exp(x*x/0.2) + log(1 + 9*y*y) + cosh(3*z) + tanh(6*x*y*z) - 3.5"
 FORMULAS = [pytest.param(text, id=name) for name, text in (
     ("sines", SINES), ("rooms", ROOMS), ("sextic", SEXTIC), ("bent", BENT), ("roots", ROOTS), ("waves", WAVES),
-    ("dented", DENTED),
+    ("dented", DENTED), ("library", LIBRARY),
 )]  # fmt: skip
 # How far from the wall, relative to its size, a fall passes it; below 0 it goes through it and back
 GAPS = [-1e-1, -1e-2, -1e-3, -1e-4, -1e-8, -1e-12, 0.0, 1e-12, 1e-8, 1e-4, 1e-2, 0.1]

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...errors import SceneError
 from ...kernel.angle import sine_and_cosine
+from ...kernel.exponential import exponential, hyperbolic, hyperbolic_tangent, logarithm
 from ..surface import Box, side_sign
 from .expression import COORDINATES, NonSmoothTerm, parse
 from .form import Form
@@ -210,7 +211,7 @@ def _along_fall(phi: Any) -> Any:
 def _made(name: str, arguments: Sequence[str], writer: "_DerivativeWriter", results: list[str]) -> Any:
     """The function of what is written."""
     lines = [f"def {name}(p, {', '.join(arguments)}):", *writer.lines, f"return {', '.join(results)}"]
-    scope: dict[str, Any] = {"np": np, "sine_and_cosine": sine_and_cosine, "__name__": __name__}
+    scope: dict[str, Any] = {"np": np, **_COMPUTED, "__name__": __name__}
     text = "\n    ".join(lines)
     file = f"<{name} {hashlib.sha256(text.encode()).hexdigest()}>"
     linecache.cache[file] = len(text), None, text.splitlines(keepends=True), file  # kernels are made of its text
@@ -219,13 +220,21 @@ def _made(name: str, arguments: Sequence[str], writer: "_DerivativeWriter", resu
     return scope[name]
 
 
+# What computes the functions of a formula: of those with one value by their names, and all.
+_OF_ONE = {"exp": "exponential", "log": "logarithm", "tanh": "hyperbolic_tangent"}
+_COMPUTED = {
+    "sine_and_cosine": sine_and_cosine, "exponential": exponential, "logarithm": logarithm, "hyperbolic": hyperbolic,
+    "hyperbolic_tangent": hyperbolic_tangent,
+}  # fmt: skip
+
+
 class _DerivativeWriter:
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.known: dict[Any, str] = {}
-        # The names of the sine and the cosine of an angle.
-        self.sines: dict[str, tuple[str, str]] = {}
-        # Whether there is only + - * /, sqrt and what is made of them.
+        # The names of the sine and the cosine of an argument, by what computes both.
+        self.sines: dict[tuple[str, str], tuple[str, str]] = {}
+        # Whether there is only what kernels compute by + - * / and sqrt.
         self.same_in_python = True
 
     def name_of(self, expression: Any) -> str:
@@ -251,14 +260,16 @@ class _DerivativeWriter:
         if expression.is_Pow:
             return self._power(self.name_of(expression.base), expression.exp)
         name, argument = expression.func.__name__, self.name_of(expression.args[0])
-        if name in ("sin", "cos", "tan"):
-            if argument not in self.sines:
-                sine, cosine = self.sines[argument] = f"t{len(self.lines)}s", f"t{len(self.lines)}c"
-                self.lines.append(f"{sine}, {cosine} = sine_and_cosine({argument})")
-            sine, cosine = self.sines[argument]
-            return {"sin": sine, "cos": cosine}.get(name) or self.assign(f"{sine} / {cosine}")
-        self.same_in_python = False
-        return self.assign(f"np.{name}({argument})")
+        if name in _OF_ONE:
+            return self.assign(f"{_OF_ONE[name]}({argument})")
+        both = "hyperbolic" if name in ("sinh", "cosh") else "sine_and_cosine"
+        if (both, argument) not in self.sines:
+            sine, cosine = self.sines[both, argument] = f"t{len(self.lines)}s", f"t{len(self.lines)}c"
+            self.lines.append(f"{sine}, {cosine} = {both}({argument})")
+        sine, cosine = self.sines[both, argument]
+        if name == "tan":
+            return self.assign(f"{sine} / {cosine}")
+        return sine if name.startswith("sin") else cosine
 
     def _product(self, expression: Any) -> str:
         above: list[str] = []

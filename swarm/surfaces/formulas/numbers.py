@@ -195,7 +195,7 @@ class OwnNumbers(contract.Smooth):
 
 
 class SmoothCavity(OwnNumbers):
-    """A formula of + - * /, roots, sines and cosines: its straight flights go in lanes. A cavity."""
+    """A formula of what kernels compute without a library: its flights go in lanes. A cavity."""
 
     in_steps = True
     looked_at = True

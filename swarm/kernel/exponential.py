@@ -1,0 +1,123 @@
+"""Exponentials and logarithms of sums, products and one quotient: those of a library end a lane loop.
+
+Their errors are below 2 ulp. In Python they take arrays too, of which NumPy computes them.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from .jit import allocating, select
+
+# The sum with it, less it again, is the nearest whole number.
+_WHOLE = 1.5 * 2.0**52
+_INVERSE_LN2 = 1.4426950408889634
+# ln 2 in two parts: the first has 32 bits, so that its product with an exponent is exact.
+_LN2_HIGH, _LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
+# From here to there the power of 2 in e^a has a normal number; beyond, e^a counts as 0 or as infinite.
+_LEAST, _MOST = -708.0, 709.0
+# 1 - y coth(y/2)/2 and its like in powers of y^2: the minimax polynomial of fdlibm on |y| <= ln(2)/2
+_EXPONENTIAL = (
+    4.13813679705723846039e-08, -1.65339022054652515390e-06, 6.61375632143793436117e-05,
+    -2.77777777770155933842e-03, 1.66666666666666019037e-01,
+)  # fmt: skip
+# 2/3, 2/5, ...: of 2 artanh(s) less its first term, from the last.
+_ARTANH = tuple(2.0 / n for n in range(21, 1, -2))
+_HALF_ROOT = 0.7071067811865476  # sqrt(1/2)
+_POWERS = tuple(1 << k for k in range(9, -1, -1))
+# Where tanh is 1 but for round-off.
+_FLAT = 40.0
+
+
+def _split(a):
+    """(2^n, e^y - 1) for a = n ln 2 + y."""
+    n = (a * _INVERSE_LN2 + _WHOLE) - _WHOLE
+    high, low = a - n * _LN2_HIGH, n * _LN2_LOW
+    y = high - low
+    z, even = y * y, 0.0
+    for coefficient in _EXPONENTIAL:
+        even = z * (coefficient + even)
+    c = y - even
+    left, power = abs(n), 1.0
+    for k in _POWERS:
+        has = left >= k
+        left = select(has, left - k, left)
+        power = select(has, power * select(n < 0.0, 2.0**-k, 2.0**k), power)
+    return power, high - (low - (y * c) / (2.0 - c))
+
+
+def _exponential(a):
+    inner = select(a > _LEAST, select(a < _MOST, a, _MOST), _LEAST)
+    power, rest = _split(inner)
+    value = select(a > _MOST, math.inf, select(a < _LEAST, 0.0, power + power * rest))
+    return select(a == a, value, a)
+
+
+def _less_one(a):
+    """e^a - 1 without cancellation, for a from 0 to 709, and from -40 on."""
+    power, rest = _split(a)
+    return power * rest + (power - 1.0)
+
+
+def _hyperbolic(a):
+    size = abs(a)
+    less = _less_one(select(size < _MOST, size, _MOST))
+    whole = less + 1.0
+    inverse = 1.0 / whole
+    sine, cosine = 0.5 * (less + less * inverse), 0.5 * (whole + inverse)
+    beyond = not size <= _MOST
+    sine, cosine = select(beyond, size + math.inf, sine), select(beyond, size + math.inf, cosine)
+    return select(a < 0.0, -sine, sine), cosine
+
+
+def _tangent(a):
+    size = abs(a)
+    less = _less_one(2.0 * select(size < _FLAT, size, _FLAT))
+    value = less / (less + 2.0)
+    return select(a == a, select(a < 0.0, -value, value), a)
+
+
+def _logarithm(u):
+    is_large, e, left = u >= 1.0, 0.0, u
+    for k in _POWERS:
+        moved = left * select(is_large, 2.0**-k, 2.0**k)
+        moves = is_large == (moved >= 1.0)
+        left, e = select(moves, moved, left), e + select(moves, select(is_large, float(k), -float(k)), 0.0)
+    # Down to between 1/2 and 1
+    value = logarithm_of(select(is_large, 0.5 * left, left), select(is_large, e + 1.0, e))
+    value = select(u > 0.0, select(u < math.inf, value, u), math.nan)
+    return select(u == 0.0, -math.inf, value)
+
+
+def logarithm_of(u, e):
+    """ln(2^e u) for u in [1/2, 1], to one unit in the last place.
+
+    2^e u = 2^k (1 + f) with 1 + f within sqrt(1/2)..sqrt(2), and ln(1 + f) = 2 artanh(s) for s = f/(2 + f): with 2 s =
+    f - s f that is f - s (f - R), R = 2 s^2/3 + 2 s^4/5 + ..., |s| < 0.172; its rounding is small beside f. What is
+    left out is 2 s^22/23 < 2e-18 of R.
+    """
+    small = u < _HALF_ROOT
+    f, e = select(small, u + u, u) - 1.0, select(small, e - 1.0, e)
+    s = f / (2.0 + f)
+    z = s * s
+    rest = 0.0
+    for coefficient in _ARTANH:
+        rest = z * (coefficient + rest)
+    return e * _LN2_HIGH - ((s * (f - rest) - e * _LN2_LOW) - f)
+
+
+def _of_numbers(of_one: Any, of_arrays: Any, meaning: str) -> Any:
+    """A function of a number, which in Python takes arrays too."""
+
+    def in_python(a):
+        return of_one(a) if np.ndim(a) == 0 else of_arrays(a)
+
+    in_python.__doc__ = meaning
+    return allocating(in_python, of_one)
+
+
+exponential = _of_numbers(_exponential, np.exp, "e^a: 0 below a = -708, infinite above 709.")
+hyperbolic = _of_numbers(_hyperbolic, lambda a: (np.sinh(a), np.cosh(a)), "(sinh a, cosh a), infinite beyond 709.")
+hyperbolic_tangent = _of_numbers(_tangent, np.tanh, "tanh a")
+logarithm = _of_numbers(_logarithm, np.log, "ln u, of a normal number.")
