@@ -145,6 +145,21 @@ def test_falls_of_many_meet_formulas_at_the_first_root(text, seed):
         _require_first_roots(text, seed, 12)
 
 
+@pytest.mark.parametrize("text", FORMULAS)
+def test_third_derivatives_are_within_their_bound(text):
+    wall, random = _surface(text).numbers(), np.random.default_rng(4)
+    points = _surface(text)._form.points(2000)
+    points = points[:, wall.side * wall.phi(vec(points)) <= 0.0]
+    ways = random.normal(size=points.shape)
+    ways /= np.sqrt((ways**2).sum(axis=0))
+    step = 1e-4 * wall.size
+    ends = (np.broadcast_arrays(*wall.hessian(vec(points + sign * step * ways)), points[0])[:6] for sign in (1.0, -1.0))
+    change = np.subtract(*map(np.array, ends)) / step
+    u, v, w = ways
+    third = (change * [u * u, v * v, w * w, 2.0 * u * v, 2.0 * v * w, 2.0 * w * u]).sum(axis=0)
+    assert 0.1 * wall.bends.third <= np.abs(third).max() <= wall.bends.third
+
+
 @pytest.mark.parametrize(("text", "most"), [(SINES, 7.0), (SEXTIC, 15.0)], ids=["sines", "sextic"])
 def test_few_looks_find_the_hit_of_a_fall(text, most):
     random, wall, looks = np.random.default_rng(3), _surface(text).numbers(), []
@@ -157,3 +172,22 @@ def test_few_looks_find_the_hit_of_a_fall(text, most):
             looks.append(count)
     assert len(looks) >= 20
     assert np.mean(looks) <= most
+
+
+# Falls that come within 1e-8 of a wall which bends by less than it does elsewhere: (place, velocity, pull)
+GRAZING = [
+    pytest.param(SEXTIC, (-0.520575845837, -0.021343565634, -0.050181361806), (-0.005312423989, -0.600114321817,
+        -0.193188721931), (0.036159505491, 0.130400004513, 0.094708096312), id="sextic"),
+    pytest.param(LIBRARY, (0.251580005161, -0.232684623762, -0.350828121489), (-0.075254152469, -0.209125143780,
+        0.095977804534), (-0.013210486329, 0.064042265044, 0.010490011715), id="library"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "r", "v", "pull"), GRAZING)
+def test_a_fall_that_only_just_passes_a_wall_is_looked_at_less_than_a_hundred_times(text, r, v, pull):
+    with np.errstate(all="ignore"):
+        fall, looks = falling(_surface(text).numbers(), vec(pull), vec(r), vec(v)), 0
+        known = fall.first()
+        while known.goes_on and looks < 1000:
+            known, looks = fall.look(known), looks + 1
+    assert looks < 100

@@ -29,6 +29,12 @@ _SMALLEST, _LARGEST = -40, 24
 # The box is found by cutting layers off its sides, each this part of it, of so many cells along an edge; of a cube in
 # which a cavity is looked for, so many.
 _LAYERS, _LAYER_CELLS, _CUBES = tuple(0.5**k for k in range(2, 11)), 24, 8
+# Of third derivatives: an entry of H, an axis along which it is derived, and in how many orders that is.
+_THIRDS = (
+    (0, 0, 1), (1, 1, 1), (2, 2, 1), (0, 1, 3), (0, 2, 3), (1, 0, 3), (1, 2, 3), (2, 0, 3), (2, 1, 3), (3, 2, 6)
+)  # fmt: skip
+# More than the round-off of a sum of their squares.
+_UPWARDS = 1.0 + 1e-12
 # Room around the box that was found, relative to it.
 _ROOM = 1e-3
 
@@ -158,7 +164,23 @@ class Derived(NamedTuple):
                 f"curvature must be given: the second derivatives of phi are not bounded in the bounds {form.box}; "
                 "it is a number that the second derivative in any direction never exceeds"
             )
-        return Bend.of_entries(low, high)
+        return Bend.of_entries(low, high)._replace(third=self._third(cells, admissible))
+
+    def _third(self, cells: IntervalBoxes, some: Any) -> float:
+        """A bound of the third derivative in any direction in some cells; infinite if it takes too many operations."""
+        import sympy
+
+        if self.along is not None:
+            return math.inf  # a flight to a polynomial does not ask
+        # d^3 phi/dx_i dx_j dx_k, and how often it occurs among all
+        thirds = [(2 * sympy.diff(self.hessian[h], self.axes[k]), count) for h, k, count in _THIRDS]
+        if int(sympy.count_ops([one for one, _count in thirds])) > _MOST_OPERATIONS:
+            return math.inf
+        squares = np.zeros(int(np.count_nonzero(some)))
+        for one, count in thirds:
+            part = cells.bounds(one)
+            squares += count * np.maximum(np.abs(part.low), np.abs(part.high))[some] ** 2
+        return _UPWARDS * float(np.sqrt(squares.max(initial=0.0)))
 
 
 def _shape(along: list[int], cells: int) -> list[int]:

@@ -20,12 +20,16 @@ _ONE = np.float64(1.0)
 
 
 class Bend(NamedTuple):
-    """Bounds of side H, H = grad grad phi/2: of its eigenvalues, and of its entries."""
+    """Bounds of side H, H = grad grad phi/2: of its eigenvalues, and of its entries.
+
+    `third` is one of the third derivative of phi in any direction; infinite if it is not known.
+    """
 
     least: float
     most: float
     low: Symmetric
     high: Symmetric
+    third: float = math.inf
 
     @classmethod
     def of_magnitude(cls, curvature: float) -> "Bend":
@@ -210,6 +214,11 @@ class SmoothCavity(OwnNumbers):
 
     def span(self, r, v):
         return 0.0, math.inf
+
+    def bent_along(self, r, w):
+        """w.side H w at a place."""
+        h = self.hessian(r)
+        return self.side * _quadratic(w, h, h)
 
 
 class SmoothSolid(SmoothCavity):
