@@ -133,7 +133,7 @@ def slope(p, x, y, z):
         (SURFACES["formula"], METHODS["impact"], True),
         (lambda: swarm.Formula("x**2 + y**2 + sqrt(z**2 + 1) - 1.5"), METHODS["impact"], True),
         (lambda: swarm.Formula("x**2 + y**2 + cosh(z) - 2"), METHODS["impact"], True),
-        (lambda: swarm.Formula("x**2 + y**2 + (z**2 + 1)**(1/3) - 1.5"), METHODS["impact"], False),
+        (lambda: swarm.Formula("x**2 + y**2 + (z**2 + 1)**(1/3) - 1.5"), METHODS["impact"], True),
         (lambda: swarm.OwnSurface(Radius(0.5), phi, slope, size=0.5, curvature=2.0), METHODS["impact"], False),
         (SURFACES["sphere"], swarm.Penalty(dt=1e-3, penalty=1e4, exponent=1.5), True),
         (SURFACES["sphere"], swarm.Penalty(dt=1e-3, penalty=1e4, exponent=2.0), False),

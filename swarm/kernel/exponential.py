@@ -1,6 +1,6 @@
 """Exponentials and logarithms of sums, products and one quotient: those of a library end a lane loop.
 
-Their errors are below 2 ulp. In Python they take arrays too, of which NumPy computes them.
+Their errors are below 2 ulp, of powers up to 8 too. In Python they take arrays too, of which NumPy computes them.
 """
 
 import math
@@ -26,6 +26,8 @@ _EXPONENTIAL = (
 _ARTANH = tuple(2.0 / n for n in range(21, 1, -2))
 _HALF_ROOT = 0.7071067811865476  # sqrt(1/2)
 _POWERS = tuple(1 << k for k in range(9, -1, -1))
+# 2^27 + 1, by which a number of 53 bits is cut in halves.
+_SPLITS = 134217729.0
 # Where tanh is 1 but for round-off.
 _FLAT = 40.0
 
@@ -79,23 +81,32 @@ def _tangent(a):
 
 
 def _logarithm(u):
+    value = logarithm_of(*_scaled(u))
+    value = select(u > 0.0, select(u < math.inf, value, u), math.nan)
+    return select(u == 0.0, -math.inf, value)
+
+
+def _scaled(u):
+    """(v, e) with u = 2^e v, v between 1/2 and 1."""
     is_large, e, left = u >= 1.0, 0.0, u
     for k in _POWERS:
         moved = left * select(is_large, 2.0**-k, 2.0**k)
         moves = is_large == (moved >= 1.0)
         left, e = select(moves, moved, left), e + select(moves, select(is_large, float(k), -float(k)), 0.0)
-    # Down to between 1/2 and 1
-    value = logarithm_of(select(is_large, 0.5 * left, left), select(is_large, e + 1.0, e))
-    value = select(u > 0.0, select(u < math.inf, value, u), math.nan)
-    return select(u == 0.0, -math.inf, value)
+    return select(is_large, 0.5 * left, left), select(is_large, e + 1.0, e)
 
 
 def logarithm_of(u, e):
-    """ln(2^e u) for u in [1/2, 1], to one unit in the last place.
+    """ln(2^e u) for u in [1/2, 1], to one unit in the last place."""
+    e, f, less = _near_one(u, e)
+    return e * _LN2_HIGH - ((less - e * _LN2_LOW) - f)
 
-    2^e u = 2^k (1 + f) with 1 + f within sqrt(1/2)..sqrt(2), and ln(1 + f) = 2 artanh(s) for s = f/(2 + f): with 2 s =
-    f - s f that is f - s (f - R), R = 2 s^2/3 + 2 s^4/5 + ..., |s| < 0.172; its rounding is small beside f. What is
-    left out is 2 s^22/23 < 2e-18 of R.
+
+def _near_one(u, e):
+    """(k, f, f - ln(1 + f)) for 2^e u = 2^k (1 + f) with 1 + f within sqrt(1/2)..sqrt(2).
+
+    ln(1 + f) = 2 artanh(s) for s = f/(2 + f): with 2 s = f - s f that is f - s (f - R), R = 2 s^2/3 + 2 s^4/5 + ...,
+    |s| < 0.172; its rounding is small beside f. What is left out is 2 s^22/23 < 2e-18 of R.
     """
     small = u < _HALF_ROOT
     f, e = select(small, u + u, u) - 1.0, select(small, e - 1.0, e)
@@ -104,14 +115,36 @@ def logarithm_of(u, e):
     rest = 0.0
     for coefficient in _ARTANH:
         rest = z * (coefficient + rest)
-    return e * _LN2_HIGH - ((s * (f - rest) - e * _LN2_LOW) - f)
+    return e, f, s * (f - rest)
+
+
+def _power(u, c):
+    # ln u = a + b and c ln u = p + q, b and q of the order of round-off: e^(c ln u) has the digits of both.
+    e, f, less = _near_one(*_scaled(u))
+    top = e * _LN2_HIGH
+    above = top + f
+    below = (f - (above - top)) - (less - e * _LN2_LOW)
+    a = above + below
+    b = below - (a - above)
+    (a_high, a_low), (c_high, c_low), p = _halves(a), _halves(c), a * c
+    q = (((a_high * c_high - p) + a_high * c_low) + a_low * c_high) + a_low * c_low
+    value = _exponential(p)
+    value = value + value * (q + b * c)
+    return select(u > 0.0, select(u < math.inf, value, u), select(u == 0.0, 0.0, math.nan))
+
+
+def _halves(a):
+    """Two numbers of 26 bits with the sum a (Veltkamp): their products are exact."""
+    moved = _SPLITS * a
+    high = moved - (moved - a)
+    return high, a - high
 
 
 def _of_numbers(of_one: Any, of_arrays: Any, meaning: str) -> Any:
     """A function of a number, which in Python takes arrays too."""
 
-    def in_python(a):
-        return of_one(a) if np.ndim(a) == 0 else of_arrays(a)
+    def in_python(a, *more):
+        return of_one(a, *more) if np.ndim(a) == 0 else of_arrays(a, *more)
 
     in_python.__doc__ = meaning
     return allocating(in_python, of_one)
@@ -121,3 +154,4 @@ exponential = _of_numbers(_exponential, np.exp, "e^a: 0 below a = -708, infinite
 hyperbolic = _of_numbers(_hyperbolic, lambda a: (np.sinh(a), np.cosh(a)), "(sinh a, cosh a), infinite beyond 709.")
 hyperbolic_tangent = _of_numbers(_tangent, np.tanh, "tanh a")
 logarithm = _of_numbers(_logarithm, np.log, "ln u, of a normal number.")
+power = _of_numbers(_power, np.power, "u^c for a normal number u, c above 0; 12 ulp at c = 64.")

@@ -13,7 +13,7 @@ import swarm
 from swarm.kernel.gravity import Gravity, accelerated, displacement
 from swarm.kernel.vector import Vec, dot, vec
 from swarm.surfaces.formulas.derivatives import derived
-from swarm.surfaces.formulas.numbers import OwnNumbers, SmoothCavity, SmoothSolid
+from swarm.surfaces.formulas.numbers import SmoothCavity, SmoothSolid
 from swarm.surfaces.formulas.polynomial import (
     ConvexQuadraticCavity,
     ConvexQuarticCavity,
@@ -309,7 +309,7 @@ def test_no_guess_leads_beyond_a_first_root(kind):
         ("x**2 + y**2 + sin(z)**2 + z**2 - 1", "inside", SmoothCavity),
         ("x**2/(1 + y**2) + y**2 + z**2 - 1", "inside", SmoothCavity),
         ("x**6 + y**2 + z**2 - 1", "outside", SmoothSolid),
-        ("x**2 + y**2 + exp(z*z) - 2", "inside", OwnNumbers),
+        ("x**2 + y**2 + exp(z*z) - 2", "inside", SmoothCavity),
     ],
 )
 def test_what_is_a_polynomial_is_recognised(text, side, kind):

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import SceneError
 from ...kernel.angle import sine_and_cosine
-from ...kernel.exponential import exponential, hyperbolic, hyperbolic_tangent, logarithm
+from ...kernel.exponential import exponential, hyperbolic, hyperbolic_tangent, logarithm, power
 from ..surface import Box, side_sign
 from .expression import COORDINATES, NonSmoothTerm, parse
 from .form import Form
@@ -94,12 +94,12 @@ class Derived(NamedTuple):
         A formula that lacks a coordinate is a cylinder: the box has no ends along that axis.
         """
         across = [k for k, axis in enumerate(self.axes) if axis in self.phi.free_symbols] or [0, 1, 2]
-        for power in range(_LARGEST, _SMALLEST, -1):
-            half = 2.0**power
+        for k in range(_LARGEST, _SMALLEST, -1):
+            half = 2.0**k
             cells = IntervalBoxes.grid(self.axes, ((-half,) * 3, (half,) * 3), _shape(across, _CUBES))
             shell = (np.maximum(-cells.lower, cells.upper) > 0.5 * half)[across].any(axis=0)
             if not (cells.bounds(self.phi).low > 0.0)[shell].all():
-                return None if power == _LARGEST else self._tightened(half, across)
+                return None if k == _LARGEST else self._tightened(half, across)
         raise SceneError("phi must be 0 somewhere, got above 0 everywhere")
 
     def _tightened(self, half: float, across: list[int]) -> Box:
@@ -142,7 +142,7 @@ class Derived(NamedTuple):
 
     def _constant_bend(self, side: float) -> Bend:
         entries = side * np.array([float(one) for one in self.hessian])[:, None]
-        return Bend.of_entries(entries, entries)
+        return Bend.of_entries(entries, entries)._replace(third=0.0)
 
     def bend(self, form: Form) -> Bend:
         """Bounds of side H over the box of a form, a solid's with its margin.
@@ -238,7 +238,6 @@ def _made(name: str, arguments: Sequence[str], writer: "_DerivativeWriter", resu
     file = f"<{name} {hashlib.sha256(text.encode()).hexdigest()}>"
     linecache.cache[file] = len(text), None, text.splitlines(keepends=True), file  # kernels are made of its text
     exec(compile(text, file, "exec"), scope)
-    scope[name].same_in_python = writer.same_in_python
     return scope[name]
 
 
@@ -246,7 +245,7 @@ def _made(name: str, arguments: Sequence[str], writer: "_DerivativeWriter", resu
 _OF_ONE = {"exp": "exponential", "log": "logarithm", "tanh": "hyperbolic_tangent"}
 _COMPUTED = {
     "sine_and_cosine": sine_and_cosine, "exponential": exponential, "logarithm": logarithm, "hyperbolic": hyperbolic,
-    "hyperbolic_tangent": hyperbolic_tangent,
+    "hyperbolic_tangent": hyperbolic_tangent, "power": power,
 }  # fmt: skip
 
 
@@ -256,8 +255,6 @@ class _DerivativeWriter:
         self.known: dict[Any, str] = {}
         # The names of the sine and the cosine of an argument, by what computes both.
         self.sines: dict[tuple[str, str], tuple[str, str]] = {}
-        # Whether there is only what kernels compute by + - * / and sqrt.
-        self.same_in_python = True
 
     def name_of(self, expression: Any) -> str:
         """The name that holds an expression, or the number itself."""
@@ -306,8 +303,7 @@ class _DerivativeWriter:
         if exponent < 0:
             return self.assign(f"1.0 / {self._power(base, -exponent)}")
         if not (2 * exponent).is_Integer:
-            self.same_in_python = False
-            return self.assign(f"{base} ** {_literal(exponent)}")
+            return self.assign(f"power({base}, {_literal(exponent)})")
         factors = [self.assign(f"np.sqrt({base})")] if not exponent.is_Integer else []
         n, square = int(exponent), base
         while n:

@@ -103,15 +103,14 @@ def _form_of(
         size = math.inf if box is None else min(b - a for a, b in zip(*box, strict=True)) / 2.0
     make: Any = collections.namedtuple("Parameters", [f"p{i}" for i in range(len(values))])  # type: ignore[misc]
     phi, gradient, hessian = code.functions
-    same_in_python = all(part.same_in_python for part in code.functions)
     is_solid = side == "outside" and box is not None
     parameters = make(*values)
     is_convex = exact.is_convex(side)
     if code.along is not None and code.along.degree > 2:
         is_convex = _seems_convex(phi, hessian, parameters, box, side)
-    base = base_of(code.along, is_solid, is_convex, same_in_python)
+    base = base_of(code.along, is_solid, is_convex)
     kind = class_of(parameters, phi, gradient, hessian, (code.along, code.along_fall), base)
-    kind.same_in_python = same_in_python
+    kind.same_in_python = True
     if code.along_fall is not None and not is_solid:
         kind.fall_powers = code.along_fall.degree + 1
     form = Form(kind, values, box, size, side)

@@ -126,6 +126,11 @@ class OwnNumbers(contract.Smooth):
         xy, yz, zx = a.y - b.y + c.x - d.x, c.z - d.z + e.y - f.y, e.x - f.x + a.z - b.z
         return Symmetric(k * (a.x - b.x), k * (c.y - d.y), k * (e.z - f.z), 0.5 * k * xy, 0.5 * k * yz, 0.5 * k * zx)
 
+    def bent_along(self, r, w):
+        """w.side H w at a place."""
+        h = self.hessian(r)
+        return self.side * _quadratic(w, h, h)
+
     def difference(self, r0, r1):
         d = r1 - r0
         if largest(d) > _SHORT * self.size:
@@ -199,7 +204,7 @@ class OwnNumbers(contract.Smooth):
 
 
 class SmoothCavity(OwnNumbers):
-    """A formula of what kernels compute without a library: its flights go in lanes. A cavity."""
+    """A formula that is no polynomial, or one of a higher degree: its flights are looked at in lanes. A cavity."""
 
     in_steps = True
     looked_at = True
@@ -214,11 +219,6 @@ class SmoothCavity(OwnNumbers):
 
     def span(self, r, v):
         return 0.0, math.inf
-
-    def bent_along(self, r, w):
-        """w.side H w at a place."""
-        h = self.hessian(r)
-        return self.side * _quadratic(w, h, h)
 
 
 class SmoothSolid(SmoothCavity):

@@ -10,6 +10,7 @@ from ...kernel.vector import absolute, dot, norm, square, total
 from ..balls.foot_hit import applied
 from ..time_of_impact.approach import AimedApproach, Approach, LevelBound
 from ..time_of_impact.course import Quartic, first_rise, level_and_window
+from ..time_of_impact.looks import FallToBox, falling
 from ..time_of_impact.polynomial import ConvexFlight, PolynomialFall, PolynomialFlight
 from .numbers import OwnNumbers, SmoothCavity, SmoothSolid
 
@@ -98,8 +99,14 @@ class QuadraticSolid(QuadraticCavity):
     """The same of a solid."""
 
     is_solid = True
-    # Outside its box there is no wall, whatever phi is there.
+    # Outside its box there is no wall, whatever phi is there: the level along a fall is no quartic.
     is_quartic = False
+    looked_at = True
+    falls = FallToBox
+    falling_hit = SmoothSolid.falling_hit
+
+    def steps(self, gravity, r, v):
+        return None if gravity is None else falling(self, as_vector(gravity), r, v)
 
 
 class ConvexQuadraticCavity(QuadraticCavity):
@@ -197,11 +204,10 @@ class QuarticSolid(QuarticCavity):
         )  # fmt: skip
 
 
-def base_of(along: Any, is_solid: bool, is_convex: bool, is_smooth: bool) -> Any:
+def base_of(along: Any, is_solid: bool, is_convex: bool) -> Any:
     """The class of numbers of a formula with these coefficients along a flight, None if it is no polynomial."""
     if along is None:
-        # A call of the library ends a lane loop.
-        cavity, solid = (SmoothCavity, SmoothSolid) if is_smooth else (OwnNumbers, OwnNumbers)
+        cavity, solid = SmoothCavity, SmoothSolid
     elif along.degree <= 2:
         cavity, solid = ConvexQuadraticCavity if is_convex else QuadraticCavity, QuadraticSolid
     else:
