@@ -1,9 +1,6 @@
 """Scenes of many bodies: what an impact costs among them, what the first call compiles, and what is kept."""
 
 import math
-import os
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -15,7 +12,7 @@ from numpy.typing import NDArray
 import swarm
 
 from . import impact_log, sampled
-from .report import ROOT, Row, in_turn, show, tier, write
+from .report import Row, child, in_turn, show, tier, write
 
 Floats = NDArray[np.float64]
 COUNT, FILLED, BLUR = 20_000, 0.4, 0.999
@@ -191,10 +188,7 @@ def packing(quick: bool) -> list[Row]:
 def _cold(code: str, *arguments: str) -> float:
     """Seconds of the first call in a process without compiled kernels."""
     with tempfile.TemporaryDirectory() as folder:
-        environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
-        command = [sys.executable, "-c", code, *arguments]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, cwd=ROOT)
-    return float(done.stdout.split()[-1])
+        return float(child(code, *arguments, NUMBA_CACHE_DIR=folder).split()[-1])
 
 
 def compiled(quick: bool) -> list[Row]:

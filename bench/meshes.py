@@ -1,8 +1,5 @@
 """Meshes of triangles that are walls: seconds for the scene, bytes a triangle, nanoseconds an impact, first call."""
 
-import os
-import subprocess
-import sys
 import tempfile
 import time
 from typing import Any
@@ -11,7 +8,7 @@ import numpy as np
 
 import swarm
 
-from .report import ROOT, Row, in_turn, show, tier, write
+from .report import Row, child, in_turn, show, tier, write
 
 DOWN = (0.0, 0.0, -1.0)
 # About 1e5 triangles, as the bars have it.
@@ -157,11 +154,7 @@ def main(quick: bool) -> None:
         ]
     if not quick:
         with tempfile.TemporaryDirectory() as folder:
-            environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
-            done = subprocess.run(
-                [sys.executable, "-c", _COLD], env=environment, capture_output=True, text=True, check=True, cwd=ROOT
-            )
-        seconds = float(done.stdout.split()[-1])
+            seconds = float(child(_COLD, NUMBA_CACHE_DIR=folder).split()[-1])
         rows.append(Row("first call", seconds, seconds, "s"))
     rows += moving(quick)
     show(rows)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import psutil
 
-from .report import ROOT, Row, show, tier, write
+from .report import ROOT, Row, as_usual, child, show, tier, write
 
 # The bar: a sweep of short runs takes at most so much more than the compilation and the runs on all cores.
 BAR = 1.3
@@ -60,7 +60,7 @@ print(cold - own[0], sum(own))
 def _environment(folder: Path) -> dict[str, str]:
     """That of a process with its kernels in a folder."""
     found = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
-    return {**os.environ, "NUMBA_CACHE_DIR": str(folder), "PYTHONPATH": found}
+    return {**as_usual(), "NUMBA_CACHE_DIR": str(folder), "PYTHONPATH": found}
 
 
 def _sweep(path: Path, folder: Path, cache: Path) -> tuple[float, list[tuple[float, float, float]]]:
@@ -87,11 +87,8 @@ def _short_runs(place: Path, seeds: int, count: int, until: float, quick: bool) 
     (folder / "alone").mkdir(parents=True)
     path = folder / "short.toml"
     path.write_text(_SCENE.format(count=count, until=until, seeds=seeds))
-    done = subprocess.run(
-        [sys.executable, "-c", _ALONE, str(path), str(folder / "alone"), tier()],
-        env=_environment(folder / "cold"), capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    compiling, own = map(float, done.stdout.split())
+    said = child(_ALONE, str(path), str(folder / "alone"), tier(), NUMBA_CACHE_DIR=str(folder / "cold"))
+    compiling, own = map(float, said.split())
     cores = len(os.sched_getaffinity(0))
     wall, _memory = _sweep(path, folder / "short", folder / "colder")
     least = compiling + own / cores

@@ -47,7 +47,8 @@ CORE = [
     ["contact"],
     ["surfaces"],
     ["motion", "pairs", "particles", "views"],
-    ["__init__", "common", "kernel"],
+    ["__init__", "common"],
+    ["kernel"],
     ["errors", "moved", "state", "version"],
 ]
 LAYERS = WINGS + CORE

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any
 
+from ..kernel.collection import uncollected
+
 # The exit code that a shell gives a process that SIGINT ended; the descriptor of standard error.
 _EXIT, _STDERR = 130, 2
 _DEFAULTS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
@@ -39,16 +41,12 @@ def importing() -> Iterator[None]:
     It would look through the modules again and again: 40 ms. What is there after the first imports is never collected,
     as modules are not; what comes later is, as before.
     """
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        with at_once():
+    with uncollected(), at_once():
+        try:
             yield
-    finally:
-        if not gc.get_freeze_count():
-            gc.freeze()
-        if was_on:
-            gc.enable()
+        finally:
+            if not gc.get_freeze_count():
+                gc.freeze()
 
 
 def leave_at_once() -> None:

@@ -2,7 +2,6 @@
 
 import contextlib
 import functools
-import gc
 import operator
 import tomllib
 from collections.abc import Callable, Iterator
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from ..common import links
 from ..common.checks import path_of
 from ..errors import SceneError
+from ..kernel.collection import uncollected
 from ..methods import Method
 from ..scene import Scene
 from ..serialization import plugins, run_tables, tables
@@ -139,13 +139,8 @@ def parsed(text: str) -> dict[str, Any]:
     A text that is too deep takes the recursion to its limit. Objects of h5py that were collected there could not give
     back its lock, and the next thread that wants it would wait for ever; so nothing is collected meanwhile.
     """
-    collects = gc.isenabled()
-    gc.disable()
-    try:
+    with uncollected():
         return tomllib.loads(text)
-    finally:
-        if collects:
-            gc.enable()
 
 
 def open_stored(path: Path) -> h5py.File:

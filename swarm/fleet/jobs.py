@@ -13,12 +13,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from ..errors import SwarmError
-from ..run.options import RunOptions
-from ..run.progress import Display
-from ..run.session import Session
+
+if TYPE_CHECKING:
+    from ..run.options import RunOptions
+    from ..run.progress import Display
+    from ..run.session import Session
 
 # Seconds between looks at the jobs, and between requests to stop: jobs may begin after the first one.
 _GLANCE, _AGAIN = 0.1, 1.0
@@ -36,8 +38,10 @@ class Reporter(NamedTuple):
     tell: Tell
     every: float
 
-    def display(self) -> Display:
+    def display(self) -> "Display":
         """The display of a run that reports the share that is done, and what it compiles."""
+        from ..run.progress import Display
+
         last = -math.inf
 
         def within(moment: float, until: float) -> None:
@@ -66,7 +70,7 @@ class FleetJob(NamedTuple):
 # --- On the worker --------------------------------------------------------------------------------------
 
 # The sessions of the runs that are under way in this process, by fleet, and the fleets that were stopped.
-_sessions: dict[str, set[Session]] = {}
+_sessions: "dict[str, set[Session]]" = {}
 _stopped: set[str] = set()
 
 
@@ -90,8 +94,10 @@ def carried_out(
 
 
 @contextlib.contextmanager
-def session_of(options: RunOptions, token: str) -> Iterator[Session]:
+def session_of(options: "RunOptions", token: str) -> "Iterator[Session]":
     """A session that a request to stop its fleet ends."""
+    from ..run.session import Session
+
     session = Session(options)
     _sessions.setdefault(token, set()).add(session)
     try:

@@ -18,6 +18,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from ..common import interrupt
 from ..errors import RunError
 from . import jobs
 
@@ -196,6 +197,8 @@ def _begin(line: "Connection[Any, Any]", printed: Path) -> None:
     _line = line
     threading.Thread(target=_listen, args=(line,), daemon=True).start()
     line.send(_READY)
+    with interrupt.importing():
+        from . import sweep_run  # noqa: F401  what the jobs need
 
 
 def _listen(line: "Connection[Any, Any]") -> None:

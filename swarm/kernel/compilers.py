@@ -10,7 +10,6 @@ Where it pays, the loops over lanes of flights take vectors of 512 bits.
 import contextlib
 import copy
 import functools
-import gc
 import sys
 import threading
 from collections.abc import Iterator
@@ -22,6 +21,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
 from .arguments import wrap
+from .collection import uncollected
 
 _CONFIG: Any = numba.config
 # Frames that a trace may nest; 1600 take less than 512 kB of a stack.
@@ -150,7 +150,7 @@ class KernelCompiler(Compiler):  # type: ignore[misc]
 
     def compile_extra(self, func: Any) -> Any:
         """Compile a kernel with its helpers."""
-        with _uncollected(), deep():
+        with uncollected(), deep():
             return super().compile_extra(func)
 
 
@@ -165,17 +165,6 @@ class WideLongKernelCompiler(LongKernelCompiler):
     """The same, with vectors of 512 bits."""
 
     is_wide = True
-
-
-@contextlib.contextmanager
-def _uncollected() -> Iterator[None]:
-    before = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if before:
-            gc.enable()
 
 
 _limits = threading.Lock()

@@ -3,10 +3,13 @@
 To import Numba, LLVM and the trace, and to load a kernel, takes 0.6 s of processor time, more than such a run.
 """
 
+import gc
 import importlib
 import threading
 from collections.abc import Callable
 from typing import Any
+
+from .collection import uncollected
 
 _waiting: list[Callable[[Any], Any]] = []
 _lock = threading.RLock()
@@ -21,8 +24,18 @@ def defer(action: Callable[[Any], Any]) -> None:
 
 
 def compiler() -> Any:
-    """The module `machine_code`, which the first call imports."""
-    return importlib.import_module(".machine_code", __package__)
+    """The module `machine_code`, which the first call imports.
+
+    Nothing is collected meanwhile. If the imports of the process are frozen, as a command freezes its own, these are
+    too: to look through what Numba makes takes 0.1 s and finds nothing.
+    """
+    if is_loaded():
+        return importlib.import_module(".machine_code", __package__)
+    with uncollected():
+        made = importlib.import_module(".machine_code", __package__)
+        if gc.get_freeze_count():
+            gc.freeze()
+    return made
 
 
 def is_loaded() -> bool:
