@@ -39,7 +39,7 @@ class Session:
     """`swarm sweep` of the file beside a folder, in a process group of its own, as a shell starts it."""
 
     def __init__(self, folder, *words):
-        self.folder, self.workers = folder, set()
+        self.folder, self.workers, self.began = folder, set(), time.time()
         self.process = subprocess.Popen(
             [sys.executable, "-m", "swarm", "sweep", str(folder.parent / "sweep.toml"), "-o", str(folder), *words],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
@@ -65,9 +65,9 @@ class Session:
         return self.process.returncode, output, errors
 
     def killed_by(self, kind, wait):
-        """The same after a signal, so many seconds after workers are there and a trajectory is: to all, or one."""
+        """The same after a signal, so many seconds after workers are there and write a trajectory: to all, or one."""
         self.ended_or_has(self.find_workers)
-        self.ended_or_has(lambda: list(self.folder.glob("*.h5")))
+        self.ended_or_has(lambda: any(file.stat().st_mtime > self.began for file in self.folder.glob("*.h5")))
         time.sleep(wait)
         self.find_workers()
         if self.process.poll() is None:

@@ -49,11 +49,17 @@ def sweep(  # noqa: PLR0913  one argument an option
     ] = False,
 ) -> None:
     """Carry out the runs of a sweep file, and write one table of their results."""
-    with interrupt.importing():
-        from ..common.checks import duration
-        from ..fleet import sweeping
-
+    first = None
     try:
+        with interrupt.importing():
+            if cluster is None:
+                from ..fleet.processes import Place
+
+                first = Place()
+                first.start()
+            from ..common.checks import duration
+            from ..fleet import sweeping
+
         latest = None if walltime is None else duration("--walltime", walltime)
         options = sweeping.SweepOptions(
             output,
@@ -67,7 +73,7 @@ def sweep(  # noqa: PLR0913  one argument an option
             tuple(plugins or ()),
             cluster,
         )
-        outcome = sweeping.carry_out_sweep(sweep_file, options)
+        outcome = sweeping.carry_out_sweep(sweep_file, options, first)
     except KeyboardInterrupt:  # the second one
         print("interrupted; with --resume, runs that were under way go on from their last checkpoints", file=sys.stderr)
         if as_json:
@@ -77,6 +83,9 @@ def sweep(  # noqa: PLR0913  one argument an option
         if as_json:
             print(json.dumps({"status": "failed", "error": str(error)}))
         raise
+    finally:
+        if first is not None:
+            first.close()
     with interrupt.at_once():
         _report(outcome, quiet, as_json)
     if outcome.stopped:

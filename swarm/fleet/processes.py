@@ -34,12 +34,17 @@ _EXIT = re.compile(r"exit codes of the workers are \{(\w+)\((-?\d+)\)\}")
 
 
 class Processes(jobs.Fleet):
-    """At most so many processes, each of which starts when a job needs it."""
+    """At most so many processes, each of which starts when a job needs it.
 
-    def __init__(self, stop: jobs.Stop, number: int) -> None:
+    Args:
+        stop: as of `Fleet`.
+        number: of processes.
+        first: of them, which may have started; None: one more that starts when a job needs it.
+    """
+
+    def __init__(self, stop: jobs.Stop, number: int, first: "Place | None" = None) -> None:
         super().__init__(stop)
-        self._folder = tempfile.TemporaryDirectory(prefix="swarm-", ignore_cleanup_errors=True)
-        self._places = [_Place(Path(self._folder.name, str(k))) for k in range(number)]
+        self._places = [first or Place(), *(Place() for _ in range(number - 1))]
 
     def room(self) -> float:
         """One job a process."""
@@ -82,27 +87,37 @@ class Processes(jobs.Fleet):
         """End all processes at once: the files of a run survive an end at any moment."""
         for place in self._places:
             place.close()
-        self._folder.cleanup()
 
 
-class _Place:
+class Place:
     """A process, or room for one; what it prints goes to a file."""
 
-    def __init__(self, printed: Path) -> None:
-        self._printed = printed
+    def __init__(self) -> None:
         self.executor: Any = None
         self.job, self.ready = -1, False
 
+    def start(self) -> None:
+        """Start the process, which imports what jobs need meanwhile, as the caller does."""
+        self._make()
+        with _without_interrupts():
+            self.executor.submit(os.getpid)
+
     def submit(self, job: jobs.FleetJob, token: str) -> "Future[jobs.JobEnd]":
+        """Hand out a job, also to a process that has died, which the future says."""
         self.job = job.number
         if self.executor is None:
-            self._start()
-        self._printed.write_bytes(b"")
-        with _without_interrupts():
-            made: Future[jobs.JobEnd] = self.executor.submit(_work, job.work, job.arguments, token)
+            self._make()
+        os.truncate(self._printed, 0)
+        made: Future[jobs.JobEnd]
+        try:
+            with _without_interrupts():
+                made = self.executor.submit(_work, job.work, job.arguments, token)
+        except BrokenExecutor as error:
+            made = Future()
+            made.set_exception(error)
         return made
 
-    def _start(self) -> None:
+    def _make(self) -> None:
         """Make the executor; its process begins with its first job."""
         from multiprocessing import resource_tracker
 
@@ -114,6 +129,9 @@ class _Place:
             resource_tracker.ensure_running()
             tracker_of_loky.ensure_running()
         self.ready = False
+        descriptor, name = tempfile.mkstemp(prefix="swarm-")
+        os.close(descriptor)
+        self._printed = Path(name)
         # The end of the process stays open here: loky may replace a process that has grown much.
         self._line, self._far_end = multiprocessing.Pipe()
         self.executor = loky.ProcessPoolExecutor(
@@ -121,6 +139,7 @@ class _Place:
         )
 
     def messages(self) -> Iterator[dict[str, Any]]:
+        """What has come from the process."""
         while self.executor is not None and self._line.poll():
             message = self._line.recv()
             self.ready = self.ready or message == _READY
@@ -128,6 +147,7 @@ class _Place:
                 yield message
 
     def tell(self, token: str) -> None:
+        """Ask the process to stop the jobs of a fleet."""
         if self.executor is not None:
             with contextlib.suppress(OSError):  # it has died, which its future says
                 self._line.send(token)
@@ -146,11 +166,13 @@ class _Place:
         return f"its process was ended by {name}{why}{last}"
 
     def close(self) -> None:
+        """End the process at once."""
         if self.executor is not None:
             self.executor.shutdown(wait=True, kill_workers=True)
             self.executor = None
             self._line.close()
             self._far_end.close()
+            _remove(self._printed)
 
 
 @contextlib.contextmanager
@@ -181,6 +203,12 @@ def _without_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+def _remove(printed: Path) -> None:
+    """Remove the file of a process; Windows does not while the process has it open."""
+    with contextlib.suppress(OSError):
+        printed.unlink()
+
+
 # --- In the process -------------------------------------------------------------------------------------
 
 _line: Any = None
@@ -195,18 +223,19 @@ def _begin(line: "Connection[Any, Any]", printed: Path) -> None:
     for stream in (1, 2):
         os.dup2(out, stream)
     _line = line
-    threading.Thread(target=_listen, args=(line,), daemon=True).start()
+    threading.Thread(target=_listen, args=(line, printed), daemon=True).start()
     line.send(_READY)
     with interrupt.importing():
         from . import sweep_run  # noqa: F401  what the jobs need
 
 
-def _listen(line: "Connection[Any, Any]") -> None:
+def _listen(line: "Connection[Any, Any]", printed: Path) -> None:
     with contextlib.suppress(OSError, EOFError):
         while True:
             jobs.stop(line.recv())
     # The parent has ended: no process waits for the outcome. The files of a run survive an end at any moment, and their
     # locks are free for the sweep that goes on with them.
+    _remove(printed)
     os._exit(_ORPHANED)
 
 

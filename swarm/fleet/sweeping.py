@@ -20,7 +20,7 @@ from . import sent_modules
 from .connection import Workers, connected, require_known, require_read, require_same_versions, require_shared
 from .jobs import Fleet, FleetJob, Stop
 from .plan import Plan, Variant, read
-from .processes import Processes
+from .processes import Place, Processes
 from .results import TABLES, Results, require_written
 from .shown import Progress, Show, shown
 from .sweep_run import RunOrder, run_variant
@@ -150,8 +150,11 @@ def sweep(  # noqa: PLR0913  the keywords are the public interface
     return outcome.results.frame()
 
 
-def carry_out_sweep(path: str | os.PathLike[str], options: SweepOptions) -> Outcome:
-    """Carry out a sweep; an interrupt or the wall time limit ends it with its table written."""
+def carry_out_sweep(path: str | os.PathLike[str], options: SweepOptions, first: Place | None = None) -> Outcome:
+    """Carry out a sweep; an interrupt or the wall time limit ends it with its table written.
+
+    `first` is a process of this machine that may have started.
+    """
     began = time.monotonic()
     require_written(options.table)
     source = path_of("path", path)
@@ -176,7 +179,7 @@ def carry_out_sweep(path: str | os.PathLike[str], options: SweepOptions) -> Outc
             results.remove()
         results.find()
         results.keep_file()
-        _Runs(plan, results, options, stop, began).carry_out(client)
+        _Runs(plan, results, options, stop, began).carry_out(client, first)
         results.write()
     stopped = stop.reason if results.of_state("waiting") else ""
     return Outcome(results, stopped, time.monotonic() - began)
@@ -212,13 +215,13 @@ class _Runs:
         self._due = time.monotonic() + _TABLE_EVERY
         self._sentence, self._stops = "", False
 
-    def carry_out(self, client: Any) -> None:
+    def carry_out(self, client: Any, first: Place | None) -> None:
         """Carry them out, by the workers of a client, or by processes of this machine."""
         fleet: Fleet
         if client is None:
             mine = cores()
             processes = min(self._options.processes or mine, max(1, len(self._left)))
-            fleet, threads, modules = Processes(self._stop, processes), max(1, mine // processes), None
+            fleet, threads, modules = Processes(self._stop, processes, first), max(1, mine // processes), None
         else:
             fleet, threads = Workers(client, self._stop), 1
             modules = sent_modules.pickled() if self._plan.plugins else None

@@ -1,7 +1,11 @@
 """Which run is handed out when, and what a worker that does not start is."""
 
+import os
 import signal
+import subprocess
 import sys
+import time
+from pathlib import Path
 
 import loky
 import pytest
@@ -10,7 +14,7 @@ from sweep_sessions import write
 import swarm
 from swarm.fleet import jobs, sweeping
 from swarm.fleet.plan import Variant, read
-from swarm.fleet.processes import Processes
+from swarm.fleet.processes import Place, Processes
 
 
 def test_the_first_of_each_kind_comes_first():
@@ -57,6 +61,49 @@ def test_a_process_that_dies_or_fails_fails_its_job_alone():
     assert "was ended by SIGKILL" in ended[1]["error"]
     assert "the last that it printed: the last words" in ended[1]["error"]
     assert ended[2] == {"state": "failed", "error": "unexpected KeyError: 'what'", "lost": True}
+
+
+def number(reporter):
+    return {"process": os.getpid()}
+
+
+def test_a_process_that_has_started_takes_the_first_job():
+    """One that has died by then fails it, and the next job gets another process."""
+    ended, first = {}, Place()
+    first.start()
+    (process,) = first.executor._processes
+    with Processes(jobs.Stop(), 1, first) as fleet:
+        fleet.run([jobs.FleetJob(0, number, ())], ended.__setitem__, lambda: None)
+        os.kill(process, signal.SIGKILL)
+        while first.executor._flags.broken is None:
+            time.sleep(0.01)
+        fleet.run((jobs.FleetJob(k, number, ()) for k in (1, 2)), ended.__setitem__, lambda: None)
+    assert ended[0] == {"state": "done", "process": process}
+    assert "was ended by SIGKILL" in ended[1]["error"]
+    assert ended[2]["process"] != process
+    assert first.executor is None
+    assert not first._printed.exists()
+
+
+def test_the_file_of_a_process_ends_with_its_parent():
+    """Also where that is killed, and can remove nothing."""
+    code = """if True:
+        import os, signal
+        from swarm.fleet.processes import Place
+        place = Place()
+        place.start()
+        while not place.ready:
+            list(place.messages())
+        print(place._printed, flush=True)
+        os.kill(os.getpid(), signal.SIGKILL)
+    """
+    done = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert done.returncode == -signal.SIGKILL
+    printed, latest = Path(done.stdout.strip()), time.monotonic() + 60.0
+    assert printed.name.startswith("swarm-")
+    while printed.exists():
+        assert time.monotonic() < latest
+        time.sleep(0.02)
 
 
 def test_processes_end_with_their_fleet():

@@ -9,7 +9,7 @@ from sweep_sessions import write
 import swarm
 from swarm.commands import sweep as module
 from swarm.commands.sweep import sweep
-from swarm.fleet import sweeping
+from swarm.fleet import processes, sweeping
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +70,16 @@ def test_the_wall_time_has_an_exit_code_of_its_own(tmp_path, capsys):
         sweep(path, tmp_path / "out", processes=1, quiet=True, walltime="0.000000001s")
     assert end.value.exit_code == 75
     assert "the wall time limit is reached: 2 runs are left; resume with" in capsys.readouterr().err
+
+
+def test_a_process_starts_before_the_file_is_read_and_ends_with_its_error(tmp_path, monkeypatch):
+    """Its imports run beside those of the command; a cluster has workers of its own."""
+    calls = []
+    monkeypatch.setattr(processes.Place, "start", lambda place: calls.append("start"))
+    monkeypatch.setattr(processes.Place, "close", lambda place: calls.append("close"))
+    with pytest.raises(swarm.SceneError, match=r"there is no file .*none\.toml"):
+        sweep(tmp_path / "none.toml")
+    assert calls == ["start", "close"]
+    with pytest.raises(swarm.SceneError, match="there is no file"):
+        sweep(tmp_path / "none.toml", cluster="local:1")
+    assert calls == ["start", "close"]
