@@ -1,6 +1,5 @@
 """`fill`: uniform in the volume, isotropic or Maxwellian, and the same for the same seed."""
 
-import importlib
 import math
 import pickle
 
@@ -146,10 +145,33 @@ def test_a_formula_of_the_other_sign_is_named():
 
 
 def test_a_volume_too_thin_to_find_is_refused(monkeypatch):
-    monkeypatch.setattr(importlib.import_module("swarm.placing.filling"), "_TRIES", 1_000_000)
+    monkeypatch.setattr(filling, "_LEAST", 1e-5)
     scene = swarm.Scene([swarm.Sphere(1.0), swarm.Sphere(1.0 - 1e-8, side="outside")])
-    with pytest.raises(swarm.SceneError, match=r"admissible points in .* tries.*below 1e-6"):
+    with pytest.raises(
+        swarm.SceneError, match=r"found 0 admissible points in 524288 tries.*below 1e-05 of it, 8e-05 m\^3; giv"
+    ):
         swarm.fill(scene, 1000, speed=1.0)
+
+
+def test_a_thin_volume_is_found_or_refused_by_its_share():
+    """Of shares of one in a million and more next to none is refused early, and of a tenth of that all are."""
+    scene = swarm.Scene([swarm.Box((1.0, 1.0, 1.0))])
+    draw, batch, corners = np.random.default_rng(1), 1 << 18, (-np.ones((3, 1)), np.ones((3, 1)))
+
+    def tries(share):
+        """Until it is refused, or 20 million."""
+        found = draw.binomial(batch, share, 76).cumsum()
+        for k, count in enumerate(found):
+            try:
+                filling._require_share(scene, "fill", corners, int(count), (k + 1) * batch)
+            except swarm.SceneError:
+                return (k + 1) * batch
+        return math.inf
+
+    assert sum(tries(3e-6) < math.inf for _ in range(300)) <= 1
+    thin = [tries(1e-7) for _ in range(300)]
+    assert max(thin) < 20_000_000
+    assert np.median(thin) < 6_000_000
 
 
 # --- Balls -----------------------------------------------------------------------------------------------

@@ -21,8 +21,9 @@ from .sequential import VolumeBox, is_sparse, place_balls, require_packing, requ
 _BATCH = 1 << 18
 # Trials for each point that is asked for, before a whole batch is looked at.
 _TRIALS_A_POINT, _FEWEST_TRIALS = 8, 64
-# The search ends after this many points if fewer than one in a million was admissible.
-_TRIES = 20_000_000
+# The search ends if fewer than one in a million points was admissible: of this many, or earlier if by so many standard
+# deviations of the number that one in a million would be.
+_LEAST, _TRIES, _CLEARLY = 1e-6, 20_000_000, 2.0
 # Of balls the volume is estimated from as many admissible points, to 0.1 %.
 _POINTS = 1 << 18
 # How many of these tell whether balls are few, so many standard deviations from where it would be another answer; and
@@ -307,10 +308,12 @@ def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, 
 
 def _require_share(scene: Scene, user: str, corners: tuple[Floats, Floats], found: int, tried: int) -> None:
     """Raise a `SceneError` where next to none of the random points between two corners are admissible."""
-    if tried >= _TRIES and found < 1e-6 * tried:
+    least = _LEAST * tried
+    # Poisson's: the variance is the mean.
+    if found < least and (tried >= _TRIES or least - found > _CLEARLY * math.sqrt(least)):
         (low, high), axes = corners, scene.axes()
         raise SceneError(
-            f"{user} found {found} admissible points in {tried} tries, a volume of about "
-            f"{float(np.prod((high - low)[axes])) * found / tried:.2g} m^{len(axes)}: the admissible part of the box "
-            f"{low.ravel()} to {high.ravel()} is below 1e-6 of it; give the particles as arrays or a CSV file"
+            f"{user} found {found} admissible points in {tried} tries: the admissible part of the box {low.ravel()} to "
+            f"{high.ravel()} is below {_LEAST:g} of it, {_LEAST * float(np.prod((high - low)[axes])):.2g} "
+            f"m^{len(axes)}; give {_INSTEAD}"
         )
