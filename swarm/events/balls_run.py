@@ -253,7 +253,7 @@ class CollidingRun(BaseRun):
 
     def _waiting(self) -> Any:
         kinds = self._box.kinds
-        return kinds.mass == FIXED if self._flock.holds is not None else False
+        return kinds.masses() == FIXED if self._flock.holds is not None else False
 
     def _scale_of(self, seen: dict[str, Any]) -> float:
         turning = seen.get("rotational_energy", 0.0)
@@ -274,7 +274,7 @@ class CollidingRun(BaseRun):
             "escape_time": state.escape_time,
             "spin": self._balls.spin, "absorbed_time": state.absorbed_time, "absorbed_wall": state.absorbed_wall,
             "window": None if self._windows is None else self._windows.numbers,
-            "held": None if flock.holds is None else self._box.kinds.mass, "crossed": state.crossed,
+            "held": None if flock.holds is None else self._box.kinds.masses(), "crossed": state.crossed,
             "impacts_before": self._books.before,
         }  # fmt: skip
 

@@ -134,9 +134,9 @@ def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Fl
     flock = flock_of(particles, grid, loss is not None)
     shortest = max(_SHORTEST * epoch, 0.0 if loss is None else loss.duration)
     walls = compiled.walls(0.0) if scenery is None else scenery.given
-    kinds = kinds_of(particles)
+    kinds = kinds_of(particles, laws.may_wait)
     if laws.may_wait:
-        flock, kinds = flock._replace(holds=1.0), Holdable(particles.radius, particles.mass.copy())
+        flock = flock._replace(holds=1.0)
     made = Domain(walls, laws, scene.pull(), grid, kinds, loss, shortest)
     made = made._replace(turning=turning)
     if scene.gravity is not None:
@@ -145,13 +145,15 @@ def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Fl
     return made, flock, epoch
 
 
-def kinds_of(particles: Particles) -> Any:
+def kinds_of(particles: Particles, may_be_held: bool) -> Any:
     """The radii and masses of balls."""
     radius, mass = particles.radius, particles.mass
     assert radius is not None
-    if np.ptp(radius) == 0.0 and np.ptp(mass) == 0.0:
+    if not may_be_held and np.ptp(radius) == 0.0 and np.ptp(mass) == 0.0:
         return Alike(float(radius[0]), float(mass[0]), (2.0 * float(radius[0])) ** 2)
-    return Various(radius, mass)
+    size = aligned(2 * len(radius))
+    size[0::2], size[1::2] = radius, mass
+    return Holdable(size) if may_be_held else Various(size)
 
 
 def speed_of(scene: Scene, particles: Particles) -> float:

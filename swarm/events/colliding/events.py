@@ -143,7 +143,7 @@ def _at_given_wall(box, flock, books, clock, i, now):
 @outlined
 def _let_go(box, flock, books, i, now):
     """A ball leaves the wall that has held it."""
-    box.kinds.mass[index(i)] = books.mass[index(i)]
+    box.kinds.let_go(i, books.mass[index(i)])
     # With another stamp: a ball that was to meet it there looks anew.
     twice = flock.kept(i, square(flock.velocity(i)) + 2.0 * potential(box.pull, flock.place(i)))
     flock.put(i, now, flock.place(i), flock.velocity(i))
@@ -372,11 +372,13 @@ def fetch_next(box, flock):
         key, item = flock.key[index(child)], flock.item[index(child)]
         fetch(flock.event, FLOATS * item)
         fetch(flock.flight, FLOATS * item)
+        box.kinds.ask(item)
         sooner = key < soonest
         soonest, then = select(sooner, key, soonest), select(sooner, item, then)
     mate = max(flock.tag[index(WHOLES * then + PARTNER)], 0)
     fetch(flock.event, FLOATS * mate)
     fetch(flock.flight, FLOATS * mate)
+    box.kinds.ask(mate)
     x, y, z = flock.cell(then)
     for kx in range(-1, 2):
         plane = box.grid.x.offset[index(x + kx)]
