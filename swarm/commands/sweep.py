@@ -49,9 +49,10 @@ def sweep(  # noqa: PLR0913  one argument an option
     ] = False,
 ) -> None:
     """Carry out the runs of a sweep file, and write one table of their results."""
-    first = None
+    first, interrupts = None, list[bool]()
     try:
-        with interrupt.importing():
+        # Not at once: the process that has started is to end first.
+        with interrupt.taken_by(lambda: interrupts.append(True)), interrupt.importing():
             if cluster is None:
                 from ..fleet.processes import Place
 
@@ -60,6 +61,8 @@ def sweep(  # noqa: PLR0913  one argument an option
             from ..common.checks import duration
             from ..fleet import sweeping
 
+        if interrupts:
+            raise KeyboardInterrupt
         latest = None if walltime is None else duration("--walltime", walltime)
         options = sweeping.SweepOptions(
             output,

@@ -1,6 +1,7 @@
 """What `swarm sweep` prints, and its exit codes; Ctrl-C: test_sweep.py."""
 
 import json
+import signal
 
 import click
 import pytest
@@ -83,3 +84,14 @@ def test_a_process_starts_before_the_file_is_read_and_ends_with_its_error(tmp_pa
     with pytest.raises(swarm.SceneError, match="there is no file"):
         sweep(tmp_path / "none.toml", cluster="local:1")
     assert calls == ["start", "close"]
+
+
+def test_an_interrupt_of_the_imports_ends_the_process_that_has_started(tmp_path, monkeypatch, capsys):
+    calls = []
+    monkeypatch.setattr(processes.Place, "start", lambda place: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(processes.Place, "close", lambda place: calls.append("close"))
+    with pytest.raises(click.exceptions.Exit) as end:
+        sweep(tmp_path / "none.toml")
+    assert end.value.exit_code == 130
+    assert calls == ["close"]
+    assert "interrupted" in capsys.readouterr().err
