@@ -1,5 +1,6 @@
 """What is said while kernels compile, in words, for their names are of the code."""
 
+import gc
 import threading
 import time
 from types import SimpleNamespace
@@ -8,9 +9,22 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.kernel import cache
+from swarm.kernel import cache, deferred
 from swarm.kernel.compiling import Compilations
 from swarm.run import machine
+
+
+def test_the_compiler_is_frozen_where_the_imports_are(monkeypatch):
+    """A command freezes its imports, and then nothing looks through the compiler; a user's process stays as it is."""
+    for frozen in (True, False):
+        monkeypatch.setattr(deferred, "_loaded", [])
+        (gc.freeze if frozen else gc.unfreeze)()
+        before, fresh = gc.get_freeze_count(), [[]]
+        deferred.compiler()
+        assert fresh == [[]]
+        assert (gc.get_freeze_count() > before) is frozen
+        assert gc.isenabled()
+    gc.freeze()
 
 
 def named(name):

@@ -224,7 +224,8 @@ def _begin(line: "Connection[Any, Any]", printed: Path) -> None:
         os.dup2(out, stream)
     _line = line
     threading.Thread(target=_listen, args=(line, printed), daemon=True).start()
-    line.send(_READY)
+    with contextlib.suppress(OSError):  # the parent has ended, which the other thread sees too
+        line.send(_READY)
     with interrupt.importing():
         from . import sweep_run  # noqa: F401  what the jobs need
 

@@ -14,7 +14,7 @@ from sweep_sessions import write
 import swarm
 from swarm.fleet import jobs, sweeping
 from swarm.fleet.plan import Variant, read
-from swarm.fleet.processes import Place, Processes
+from swarm.fleet.processes import _ORPHANED, Place, Processes
 
 
 def test_the_first_of_each_kind_comes_first():
@@ -104,6 +104,20 @@ def test_the_file_of_a_process_ends_with_its_parent():
     while printed.exists():
         assert time.monotonic() < latest
         time.sleep(0.02)
+
+
+def test_a_process_that_begins_after_its_parent_has_ended_ends_too(tmp_path):
+    code = """if True:
+        import multiprocessing, pathlib, sys, time
+        from swarm.fleet import processes
+        here, there = multiprocessing.Pipe()
+        there.close()
+        processes._begin(here, pathlib.Path(sys.argv[1]))
+        time.sleep(60.0)
+    """
+    done = subprocess.run([sys.executable, "-c", code, tmp_path / "printed"])
+    assert done.returncode == _ORPHANED
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_processes_end_with_their_fleet():
