@@ -201,7 +201,7 @@ def test_a_source_without_a_radius_has_that_of_the_grains_at_the_start():
         for name, more in given.items()
     }
     assert runs["said"].observables["born"][-1] > 1
-    same(runs["like those at the start"], runs["said"])
+    require_same(runs["like those at the start"], runs["said"])
     np.testing.assert_allclose(runs["by the density"].particles.mass[2:], 2.0 * 4 / 3 * np.pi * 0.012**3)
 
     def refusal(mass, radius, **more):
