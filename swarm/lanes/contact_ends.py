@@ -15,13 +15,18 @@ from ..contact.wall_impact import Arriving, RandomSource, book_energy, impact_on
 from ..kernel.arrays import index, scratch
 from ..kernel.gravity import potential
 from ..kernel.jit import outlined
-from ..kernel.vector import dot, square
+from ..kernel.vector import dot, norm, square
 from .accounts import add_work
 from .escape import detain
 from .watching.log import Struck
 
 # Newton steps onto a wall, from the end of a step.
 _SWEEPS = 5
+# Of its speed before a step, what friction leaves by round-off of a particle that it stops.
+_STOPPED = 1e-9
+# An impulse of this part of the speed away has reversed the particle: one that begins at rest has all of it, to
+# round-off, of which a shallow contact has much.
+_REVERSED = 0.999
 
 
 def end_contacts(method, walls, gravity, share, lanes, i, before, pushed):
@@ -87,14 +92,15 @@ def _end(method, walls, gravity, share, lanes, i, step):
     away, pressed = -dot(relative(u, v), n), state.pressed[row, p]
     b = max(away, 0.0)
     if now.distance(wall, flier.r) > 0.0 and not (method.multiplies and away > 0.0):
-        if away <= 0.0 and dot(relative(u, before), n) < 0.0:
-            # In a contact that a weight makes last, friction acts each time that the particle turns back.
+        if away <= _STOPPED * norm(before) and dot(relative(u, before), n) < 0.0:
+            # In a contact that a weight makes last, friction acts each time that the particle turns back, and where
+            # friction at another wall stops it.
             state.pressed[row, p] = 0.0
             _drag(method, walls, share, lanes, i, (wall, n, u, pressed))
         return
     state.pressed[row, p] = 0.0
     # An impulse that has not reversed the particle is the rest of a contact that has ended.
-    if pressed >= b:
+    if pressed >= _REVERSED * b:
         _act(method, walls, now, gravity, share, lanes, i, (wall, r, n, u, b, pressed))
 
 

@@ -114,6 +114,20 @@ def test_a_particle_that_has_bounced_to_rest_presses_by_its_weight():
     assert math.isclose(seen["dissipated_energy"][-1], 1.0, rel_tol=1e-3)
 
 
+def test_what_friction_stops_in_an_edge_ends_its_contact_at_both_faces(tmp_path):
+    """Where the first contact ends, friction stops the particle along the second face, whose spring then pushes it."""
+    n, drift = 12, np.array([[0.3], [-0.3], [0.0]])
+    turns, later = np.linspace(0.4, 1.2, n), np.linspace(-0.03, 0.03, n)[np.arange(n) * 7 % n]
+    along, rest = np.array([np.cos(turns), np.sin(turns), 0.0 * turns]), np.zeros(n)
+    place = np.array([0.5 - 0.05 * along[0], 0.4 - (0.05 + later) * along[1], rest])
+    box = swarm.Box((0.5, 0.4, 0.3), restitution=0.6, friction=1.0, motion=swarm.Translation(drift[:, 0]))
+    start = swarm.Particles(place, along + drift)
+    seen = ran(swarm.Scene([box]), start, PENALTY, 0.2, 0.1, impacts=tmp_path / "log.h5").observables
+    assert balanced(seen) < 1e-12
+    with swarm.load_impacts(tmp_path / "log.h5") as log:
+        assert (np.bincount(log.table()["particle"], minlength=n) == 2).all()
+
+
 @pytest.mark.parametrize("law", ["plain", "both", "hot"])
 @pytest.mark.parametrize("name", ["Penalty", "cut", "fixed"])
 def test_the_log_has_a_row_where_a_contact_ends(tmp_path, name, law):
