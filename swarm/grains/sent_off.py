@@ -19,7 +19,21 @@ from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, square
 from ..surfaces.in_motion.posed import Posed
 from .at_walls import rising
-from .grain_arrays import AFTER, BEFORE, COAST, GAP, LIGHTNESS, RADIUS, SIZE, START, X, set_vector, vector_at
+from .grain_arrays import (
+    AFTER,
+    BEFORE,
+    COAST,
+    GAP,
+    LIGHTNESS,
+    LISTED,
+    PRESSED,
+    RADIUS,
+    SIZE,
+    START,
+    X,
+    set_vector,
+    vector_at,
+)
 from .held import hold
 from .overlaps import BALL, WALL
 from .vessel import met, met_member, moves
@@ -96,7 +110,10 @@ def _act(wall, own, world, at, time):
         return Status.SENT_WRONG.value
     set_vector(grains.speed, i, BEFORE, bounce.v)
     row = index(number)
-    books.impulse[row, one] += mass * (bounce.impulse - 2.0 * away)
+    besides = mass * (bounce.impulse - 2.0 * away)
+    books.impulse[row, one] += besides
+    if world.noting is not None:
+        world.near.wall_drag[index(int(touches.wall_rows[c, LISTED])), PRESSED] += besides
     if moves(wall):
         turned = given(u, v - before)
         give_work(books, row, one, 0.5 * mass * (bounce.work - turned))

@@ -144,3 +144,14 @@ def test_a_law_of_a_wall_acts_before_the_row(tmp_path):
         last = table[(table["particle"] == i) & (table["surface"] == 0)][-1]
         assert last["time"] == result.absorbed_time[i]
         assert np.array_equal(last["velocity_after"], result.particles.velocity[:, i])
+
+
+@pytest.mark.parametrize("law", [swarm.Absorb(1.0), swarm.CercignaniLampis(0.5, 0.4, 0.6)])
+def test_the_impulse_of_a_row_has_what_a_law_of_the_wall_adds(tmp_path, law):
+    """All contacts with the floor have ended: their rows are all that it has felt."""
+    floor = swarm.Plane((0.0, 0.0, -1.0), 0.0, laws=[law])
+    place, velocity = np.array([[0.0, 0.3, 0.6], [0.0] * 3, [0.1] * 3]), np.array([[0.2] * 3, [0.1] * 3, [-1.0] * 3])
+    start = swarm.Particles(place, velocity, 2.0, radius=0.05)
+    result, table = logged(tmp_path, swarm.Scene([floor]), start, swarm.Penalty(4e-3, 1e4), 0.2, every=0.2)
+    assert result.observables["contact_energy"][-1] == 0.0
+    assert table["impulse"].sum() == pytest.approx(result.observables["impulse"][-1, 0], rel=1e-12)
