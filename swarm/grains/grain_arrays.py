@@ -124,7 +124,6 @@ class OfWall(Record):
     rows: Any
     c: Any
 
-    @property
     def listed(self):
         """The place in the lists."""
         return index(int(self.rows[self.c, LISTED]))
@@ -151,7 +150,6 @@ class OfPair(Record):
     e: Any
     lane: Any
 
-    @property
     def listed(self):
         """The place in the lists."""
         return index(self.ends[self.e + PLACE, self.lane])

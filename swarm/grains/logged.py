@@ -53,7 +53,7 @@ class Noting(NamedTuple):
 
 def _note(matter, rubs, contact, kept, time):
     """Add a step that ends at a time [s] to what is noted of a contact; whether that begins in it."""
-    gap, k = contact.number(GAP), contact.listed
+    gap, k = contact.number(GAP), contact.listed()
     # The second one at the start of the run.
     begins = (gap <= 0.0) | (kept[k, PRESSED] == 0.0)
     if begins:
@@ -74,7 +74,7 @@ def note_pairs(matter, grains, near, touches, time):
         for k in range(touches.lanes[index(g)]):
             contact, (i, j) = pair_at(touches, g, index(k))
             if _note(matter, matter.pairs.friction is not None, contact, near.drag, time):
-                first, place = i if grains.number[i] < grains.number[j] else j, contact.listed
+                first, place = i if grains.number[i] < grains.number[j] else j, contact.listed()
                 set_vector(near.drag, place, ARRIVED, vector_at(grains.speed, first, BEFORE))
 
 
@@ -121,7 +121,7 @@ def log_pairs(matter, world, time):
                     i, j = j, i
                 r, v = vector_at(grains.place, i, X), velocity_of(world.held, grains, i)
                 at = Struck(grains.number[i], -1.0, time, r, v, v, 0.0, partner=grains.number[j])
-                _row(noting, at, near.drag, contact.listed, time, ZERO)
+                _row(noting, at, near.drag, contact.listed(), time, ZERO)
 
 
 @outlined

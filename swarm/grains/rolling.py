@@ -97,7 +97,7 @@ def book_rolling_pairs(grains, near, touches, books):
         for k in range(touches.lanes[index(g)]):
             contact, (i, j) = pair_at(touches, g, index(k))
             roll = contact.vector(ROLL)
-            set_vector(near.drag, contact.listed, KEPT_ROLL, roll)
+            set_vector(near.drag, contact.listed(), KEPT_ROLL, roll)
             turned = vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER)
             turned = turned - (vector_at(spin, j, BEFORE) + vector_at(spin, j, AFTER))
             lost = -0.25 * dot(roll, turned)
