@@ -1,8 +1,9 @@
 """The run of a scene in which walls come and go, or openings open and shut: its frames are cut at these instants."""
 
 import bisect
+import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..contact.events import ARRIVED, CAREFUL, EDGE, FLYING, HELD
 from ..errors import RunError
 from ..scene import Scene
 from ..state import Contacts, State
+from ..surfaces.surface import Surface
 from .base import OUTSIDE
 from .engine import Run
 from .failures import sentence_of_coming
@@ -23,6 +25,8 @@ class DoorRun(Run):
 
     # What contacts stored before the instant that has come, per mass [J/kg].
     _stored_before: NDArray[np.float64] | None = None
+    # Which rows have a wall that goes, or opens, then.
+    _left: NDArray[np.bool_]
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
@@ -57,7 +61,7 @@ class DoorRun(Run):
         """Take energies from the particles, per mass [J/kg], which were stored with walls that went."""
         self.state.energy[:] -= lost
         if self.state.pressed is not None:
-            self.state.pressed[:, lost > 0.0] = 0.0
+            self.state.pressed[np.ix_(self._left, lost > 0.0)] = 0.0
         self.state.dissipated[:] += lost * self.state.mass
 
     # --- At an instant -----------------------------------------------------------------------------------
@@ -72,16 +76,19 @@ class DoorRun(Run):
             self._present.reach(instant)
             state, deepest = self.state, OUTSIDE * self._scene.finite_size()
             require_free(self._scene, state, came, deepest, instant, self._first, self._present.count)
+        last, pieces = _before(self._scene, instant), self._compiled.pieces
+        gone = np.array([one.is_there(last) and not one.is_there(instant) for one in pieces.each])
         if self._law is not None:
             self._stored_before = self._stored(0.0)
+            volumes = map(itertools.chain, pieces.volumes, pieces.doorways)
+            opens = [_some_come(some, last, instant) for some in volumes]
+            self._left = (gone | opens)[self._compiled.numbering.pieces_of_rows]
         contacts = self.state.contacts
         if contacts is None or not self._kinds:
             return
-        last, pieces = _before(self._scene, instant), self._compiled.pieces.each
-        gone = [one.is_there(last) and not one.is_there(instant) for one in pieces]
-        if any(gone):
-            self._let_go(contacts, np.array(gone))
-        if any(one.is_there(instant) and not one.is_there(last) for one in self._compiled.pieces.open_volumes()):
+        if gone.any():
+            self._let_go(contacts, gone)
+        if _some_come(pieces.open_volumes(), last, instant):
             _wake(contacts, contacts.phase == ARRIVED)
 
     def _let_go(self, contacts: Contacts, gone: NDArray[np.bool_]) -> None:
@@ -98,6 +105,11 @@ class DoorRun(Run):
         contacts.walls[:, held] = -1.0
         contacts.step[held] = contacts.keep[held] = 0.0
         contacts.load[:, held] = 0.0
+
+
+def _some_come(surfaces: Iterable[Surface], last: float, instant: float) -> bool:
+    """Whether one that was not there at the last time [s] is there at an instant [s]."""
+    return any(one.is_there(instant) and not one.is_there(last) for one in surfaces)
 
 
 def comers(scene: Scene, instant: float) -> NDArray[np.bool_]:

@@ -114,6 +114,18 @@ def test_a_particle_that_has_bounced_to_rest_presses_by_its_weight():
     assert math.isclose(seen["dissipated_energy"][-1], 1.0, rel_tol=1e-3)
 
 
+def test_a_wall_that_goes_leaves_the_contact_with_another_one(tmp_path):
+    """That one is on its way out then, and has its losses and its row all the same."""
+    goes = swarm.Plane((1.0, 0.0, 0.0), 0.5, present=[(0.0, 0.14)])
+    scene = swarm.Scene([goes, swarm.Plane((0.0, 1.0, 0.0), 0.4, restitution=0.5)])
+    start = swarm.Particles((0.38, 0.3, 0.0), (1.0, 1.0, 0.0))
+    result = ran(scene, start, PENALTY, 0.19, 0.19, impacts=tmp_path / "log.h5")
+    assert balanced(result.observables) < 1e-13
+    assert result.particles.velocity[1, 0] == pytest.approx(-0.5, abs=1e-12)
+    with swarm.load_impacts(tmp_path / "log.h5") as log:
+        assert log.table()["impulse"] == pytest.approx([1.5], abs=1e-12)
+
+
 def test_what_friction_stops_in_an_edge_ends_its_contact_at_both_faces(tmp_path):
     """Where the first contact ends, friction stops the particle along the second face, whose spring then pushes it."""
     n, drift = 12, np.array([[0.3], [-0.3], [0.0]])
