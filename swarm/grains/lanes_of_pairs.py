@@ -1,10 +1,10 @@
 """The contacts of pairs in groups, each in a lane: one after the other takes three times as long.
 
-They are some parts, and a group has one of each part, so that its balls are far from one another. The numbers of a
-group are beside one another, by columns, and LLVM makes vectors of them: what is computed for a group is a loop over
-its lanes that reads what balls have, one without a branch, and one that writes to balls, which may be the same ones.
-Sweeps go over all groups; where two of a group share a ball it goes in parts: so each contact begins with what the ones
-before have led to.
+They are slices of some parts, and a group has one contact of each part of a slice: its balls are far from one another,
+but what is read of them is in the second cache. The numbers of a group are beside one another, by columns, and LLVM
+makes vectors of them: what is computed for a group is a loop over its lanes that reads what balls have, one without a
+branch, and one that writes to balls, which may be the same ones. Sweeps go over all groups; where two of a group share
+a ball it goes in parts: so each contact begins with what the ones before have led to.
 """
 
 import math
@@ -143,6 +143,11 @@ _PLACE, _SPEED, _TURNS = 0, 16, 32
 _IMPULSES, _TWISTS, _READ = 40, 48, 56
 
 
+# No slice has more groups: their rows, and the lines of their balls, are in a second cache of 1 MB. Where all are one
+# slice a step takes 1.03 times as long as 10 000 grains fall, and 1.06 to 1.15 times as they lie.
+_SLICE = 288
+
+
 def _lay(touches, g, lane, c):
     """Give a contact that has been found a lane."""
     # Nothing of its rows, which are not in the cache yet.
@@ -230,19 +235,23 @@ def group_pairs(matter, grains, near, touches, known):
     count, found, marks = touches.used[0], touches.found, touches.marks
     if known == 0:
         groups, parts = (count + LANES - 1) // LANES, 0
+        slices = groups // _SLICE + 1
         marks[:] = 0
-        for g in range(groups):
-            lanes, splits = (count - g + groups - 1) // groups, 0
-            parts += 1
-            for k in range(lanes):
-                c = index(k * groups + g)
-                i, j = index(found[c, ONE]), index(found[c, OTHER])
-                if (marks[i] == parts) | (marks[j] == parts):
-                    splits |= 1 << k
-                    parts += 1
-                marks[i], marks[j] = parts, parts
-                _lay(touches, g, index(k), c)
-            touches.lanes[index(g)], touches.splits[index(g)] = lanes, splits
+        for n in range(slices):
+            first, end = n * groups // slices, (n + 1) * groups // slices
+            part, held = end - first, min(end * LANES, count) - first * LANES
+            for g in range(first, end):
+                lanes, splits = (held - (g - first) + part - 1) // part, 0
+                parts += 1
+                for k in range(lanes):
+                    c = index(first * LANES + k * part + (g - first))
+                    i, j = index(found[c, ONE]), index(found[c, OTHER])
+                    if (marks[i] == parts) | (marks[j] == parts):
+                        splits |= 1 << k
+                        parts += 1
+                    marks[i], marks[j] = parts, parts
+                    _lay(touches, g, index(k), c)
+                touches.lanes[index(g)], touches.splits[index(g)] = lanes, splits
         for g in range(groups):
             end = touches.lanes[index(g)]
             _begin_group(matter, grains, near, touches, (g, 0, end, True))

@@ -122,11 +122,24 @@ class _LongKernel(_Kernel):
     faster. In flights it unrolls little, and that pays.
     """
 
+    # Whether numbers beside one another in a row are a vector, without a loop over them.
+    has_rows = False
+
     def _optimize_final_module(self) -> None:
         tuning = llvm.create_pipeline_tuning_options(speed_level=_level())
         tuning.loop_unrolling = False
+        tuning.slp_vectorization = self.has_rows
         builder = llvm.create_pass_builder(self._codegen._tm, tuning)
         builder.getModulePassManager().run(self._final_module, builder)
+
+
+class _WideLongKernel(_LongKernel):
+    """The kernel of grains, of each of which a row of eight numbers is read and written.
+
+    In vectors the loops over grains take 0.8 of the time and a step 0.97 to 0.99; compiling takes as long.
+    """
+
+    has_rows = True
 
 
 class KernelCompiler(Compiler):  # type: ignore[misc]
@@ -162,8 +175,9 @@ class LongKernelCompiler(KernelCompiler):
 
 
 class WideLongKernelCompiler(LongKernelCompiler):
-    """The same, with vectors of 512 bits."""
+    """The same for a `_WideLongKernel`, with vectors of 512 bits."""
 
+    library = _WideLongKernel
     is_wide = True
 
 

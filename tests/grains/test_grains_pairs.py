@@ -7,10 +7,14 @@ import pytest
 from grains_runs import ROOM, cloud, ran
 
 import swarm
-from swarm.grains import contacts, lists
+from swarm.grains import contacts, lanes_of_pairs, lists
 from swarm.grains import grain_arrays as arrays
 from swarm.grains.cell import Lengths, nearest
+from swarm.grains.grain_arrays import ENDS
+from swarm.grains.grains_run import GrainsRun
 from swarm.kernel.vector import Vec
+from swarm.run.starting_state import Seeding
+from swarm.run.tally import Watched
 
 RADIUS, MASS, ALPHA, SPEED = 0.01, 0.002, 1e5, 1.0
 
@@ -138,3 +142,31 @@ def test_a_pair_among_others_ends_as_it_does_alone():
         alone = end_of(slice(k, k + 2))
         assert together.velocity[:, k : k + 2] == pytest.approx(alone.velocity, rel=1e-12, abs=1e-12)
         assert together.position[:, k : k + 2] == pytest.approx(alone.position, rel=1e-14, abs=1e-14)
+
+
+@pytest.mark.parametrize("most", [1, 2, 288], ids=lambda most: f"{most} groups a slice")
+def test_each_contact_is_in_one_lane_and_no_ball_twice_in_a_part(most, monkeypatch):
+    """However many slices there are; and contacts that are solved to round-off do not depend on their order."""
+
+    def run_of(most):
+        monkeypatch.setattr(lanes_of_pairs, "_SLICE", most)
+        place = 0.98 * 2.0 * RADIUS * (np.indices((3, 3, 3)).reshape(3, -1) - 1.0)
+        start = swarm.Particles(place, -5.0 * place, MASS, radius=RADIUS)
+        with GrainsRun(ROOM.compiled(), start, swarm.Penalty(1e-4, 1e3), 1, None, "never", Seeding(), Watched()) as run:
+            run.observe()
+            assert run.advance(2.0, 2e-4)
+            return run.state.position, run._world.touches
+
+    position, touches = run_of(most)
+    (contacts, groups), found = touches.used, []
+    assert contacts == 54
+    for g in range(groups):
+        ends, lanes, splits, part = touches.tile.ends[g * ENDS :], touches.lanes[g], touches.splits[g], set()
+        for lane in range(lanes):
+            one, other, place = ends[:ENDS, lane]
+            part = set() if splits >> lane & 1 else part
+            assert not part & {one, other}
+            part |= {one, other}
+            found.append((one, other, place))
+    assert sorted(found) == sorted(map(tuple, touches.found[:contacts]))
+    np.testing.assert_allclose(position, run_of(10**6)[0], rtol=0.0, atol=1e-14 * RADIUS)
