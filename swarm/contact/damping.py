@@ -1,5 +1,6 @@
 """The damping of soft contacts that gives a restitution."""
 
+import functools
 import math
 
 
@@ -12,8 +13,12 @@ def damping_of(alpha: float, restitution: float) -> float | None:
     of spring and damper is 0, not y [Schwager and Poeschel 2007]: with z = sin t
         ln e = -(pi - 2 t) tan t,   and for z = cosh t   ln e = -2 t/tanh t.
     """
-    if restitution == 1.0:
-        return None
+    return None if restitution == 1.0 else 2.0 * _part_of_critical(restitution) * math.sqrt(alpha)
+
+
+@functools.lru_cache
+def _part_of_critical(restitution: float) -> float:
+    """z of a restitution below 1. A run asks for it of each wall, and twice."""
     wanted = -math.log(restitution)
     low, high = 0.0, 1.0
     while _loss(high) < wanted:
@@ -24,7 +29,7 @@ def damping_of(alpha: float, restitution: float) -> float | None:
             low = middle
         else:
             high = middle
-    return 2.0 * high * math.sqrt(alpha)
+    return high
 
 
 def _loss(z: float) -> float:
