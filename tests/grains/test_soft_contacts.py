@@ -1,5 +1,6 @@
 """Contacts that are soft for the speed: how deep they are, what is said before the run, and what ends it."""
 
+import copy
 import math
 
 import numpy as np
@@ -478,6 +479,23 @@ def test_beside_friction_sweeps_end_where_they_would_not_make_the_end_more_exact
     (exact, _), (whole, many), (short, few) = found.values()
     assert abs(short - whole).max() < 1e-2 * abs(whole - exact).max()
     assert few < 0.9 * many
+
+
+@pytest.mark.parametrize("dt", [4e-4, 8e-4])
+def test_a_step_that_counts_as_solved_would_change_by_no_more_than_its_tolerance(dt, monkeypatch):
+    """The next sweep, which is not made, does no more than is counted on: so none of these steps is unconverged."""
+    (scene, start), solve, left = heap(0.5, 0.5), step._solve, []
+
+    def solve_and_look(matter, walls, world):
+        assert solve(matter, walls, world)
+        assert world.books.lagging[0] == 0
+        left.append(step._sweep(matter, walls, copy.deepcopy(world), 1.0))
+        return True
+
+    monkeypatch.setattr(step, "_solve", solve_and_look)
+    swarm.simulate(scene, start, swarm.Penalty(dt, 1600.0, 1.0), until=0.02, compile="never")
+    assert len(left) >= round(0.02 / dt)
+    assert max(left) < step._BESIDE_FRICTION
 
 
 def test_a_pile_at_rest_takes_one_sweep_a_step():
