@@ -12,6 +12,7 @@ from swarm.kernel.gravity import Gravity
 from swarm.kernel.vector import Vec, norm, vec
 from swarm.lanes import flight
 from swarm.observables import drift
+from swarm.surfaces.balls.facet import RoundTriangle
 from swarm.surfaces.in_motion import moving
 from swarm.surfaces.in_motion.drive import drive_of
 from swarm.surfaces.rotation import Rotated
@@ -248,6 +249,32 @@ def test_a_flight_in_the_frame_of_a_mesh_that_turns_is_a_cubic_but_for_the_rest_
         off = np.linalg.norm(np.array(wall.seen(free, t).r) - np.array(now.place(t, jerk)))
         assert off <= jerk.rest * t**3 / 6.0 + 1e-14
         assert jerk.rest < now.bounds(t).jerk
+
+
+@pytest.mark.parametrize("motion", ["shaken", "turned", "all"])
+def test_a_ball_comes_to_a_triangle_that_moves_in_few_safe_steps(motion):
+    """None leads into it, and near its faces, edges and corners each doubles the digits at least."""
+    random, counts = np.random.default_rng(7), []
+    drive = drive_of(cube(motion=MOTIONS[motion]), 2.0)
+    for _flight in range(60):
+        corners, aim = random.uniform(-0.3, 0.3, (3, 3)), random.dirichlet(np.ones(3))
+        a, b, c = map(vec, corners)
+        body = RoundTriangle(a, b - a, c - a, 0.05)
+        wall = (moving.Moving if drive.turn is None else moving.TurningWall)(body, drive)
+        r = random.uniform(-0.7, 0.7, 3)
+        free = flight_of(vec(r), vec(2.0 * (aim @ corners - r)), Gravity(0.0, 0.0, -1.0), 2.0)
+        t, known = 0.0, []
+        while t < 1.0 and len(known) < 40:
+            step = body.moving_step(wall.seen(free, t), 1.0 - t).time
+            gaps = [body.phi(wall.seen(free, t + part * step).r) for part in (0.3, 0.7, 0.9, 1.0)]
+            assert min(gaps) >= -1e-14
+            known.append(step)
+            t += step
+            if gaps[-1] <= 1e-14:
+                counts.append(len(known))
+                break
+    assert len(counts) > 20
+    assert max(counts) <= 12
 
 
 @pytest.mark.long

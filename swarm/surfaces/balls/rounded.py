@@ -19,6 +19,7 @@ from .. import contract
 from ..curvature import SPACING, half_hessian
 from ..time_of_impact.approach import place
 from ..time_of_impact.course import rise_time, under_way
+from ..time_of_impact.rising import plane_step
 
 # The last step is shorter than this fraction of the radius plus round-off of a place. The square of the fraction is
 # below round-off.
@@ -64,6 +65,10 @@ class Rounded(contract.Smooth):
         half = -0.5 * dot(n, v)
         bend = 0.0 * half if gravity is None else -0.5 * dot(n, as_vector(gravity))
         return rise_time(self.radius - away, half, bend)
+
+    def moving_step(self, seen, longest):
+        away, n = self.foot(seen.r)
+        return plane_step(self.radius - away, -1.0 * n, seen, longest)
 
     def steps(self, gravity, r, v):
         return ToBody(self, gravity, r, v)

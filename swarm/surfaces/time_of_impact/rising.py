@@ -421,6 +421,21 @@ def patch_step(wall, is_behind, edges, seen, longest):
     return LevelStep(select(is_there, step.level, 0.0), select(is_there, step.half, 0.0), time)
 
 
+def plane_step(level, n, seen, longest):
+    """The `LevelStep` of a plane across the unit normal n, out of its admissible side, at which there is such a level.
+
+    Its bound holds for twice the time in which the parabola of the flight rises: near the plane it leaves the cube of
+    the step.
+    """
+    half, bend = 0.5 * dot(n, seen.v), 0.5 * dot(n, seen.a)
+    ahead = 2.0 * rise_time(level, half, bend)
+    ahead = select(ahead < longest, ahead, longest)
+    jerk = seen.jerk(ahead)
+    sixth = (1.0 / 6.0) * (positive(jerk.along(n)) + jerk.rest)
+    time = rise_time(level, half, bend + sixth * ahead)
+    return LevelStep(level, half, select(time < ahead, time, ahead))
+
+
 def bent_step(body, seen, longest):
     """The `LevelStep` of a wall that bounds its bend."""
     n, level, most, magnitude, reach, clear = body.bent(seen.r)
