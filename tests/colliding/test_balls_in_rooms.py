@@ -86,6 +86,29 @@ def test_a_flight_takes_few_looks_at_the_walls_and_none_beyond_them(name, monkey
     assert len(looks) < 12 * 20 * len(walls)
 
 
+@pytest.mark.parametrize("pull", [None, (0.5, 1.0, -3.0)], ids=["straight", "fall"])
+def test_a_flight_within_one_room_is_found_at_one_look(pull, monkeypatch):
+    """It is that in the room alone, and other walls of the union are not met."""
+    looks, look = [], joined_faces._look
+    monkeypatch.setattr(joined_faces, "_look", lambda *arguments: looks.append(arguments) or look(*arguments))
+    random, radius, count = np.random.default_rng(2), 0.05, 0
+    walls, alone = walls_of(BOXES, radius), walls_of(BOXES.parts[0], radius)
+
+    def first_two(each, r, v):
+        return sorted(one.first_hit(r, v) if pull is None else one.falling_hit(r, v, Vec(*pull)) for one in each)[:2]
+
+    with np.errstate(all="ignore"):
+        for _flight in range(40):
+            r, v = Vec(*random.uniform(-0.4, 0.4, 3)), Vec(*random.normal(size=3))
+            (time, meets), _second = first_two(alone, r, v)
+            if meets and r.x + time * (v.x + 0.5 * time * (pull or (0.0,))[0]) < 0.44:
+                looks.clear()
+                assert first_two(walls, r, v) == [(time, True), (math.inf, True)]
+                assert len(looks) == len(walls)
+                count += 1
+    assert count > 20
+
+
 @pytest.mark.parametrize("name", list(TIPPED))
 def test_a_ball_that_flies_at_a_tip_meets_it_at_a_distance_of_its_radius(name):
     union, radius = UNIONS[name], 0.04

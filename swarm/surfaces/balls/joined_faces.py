@@ -14,9 +14,11 @@ A ball in such a corner has a spring at each face: the gap of the wall is the ro
 where `one` is the farther of the two faces, and `corner` its nearest place. The distance from a face is that from all
 its places and its edges. So g has no jump where a ball leaves the tunnel: there both faces are as far as the corner.
 
-Flights of hard balls take safe steps. Where the foot on a face is seen, a flight is free until it meets the parallel
-surface. Near an edge it is free for a time that follows from the curvature of the edge. A hidden face is not met before
-its foot may be seen. A hidden edge is not met before its foot may be seen or is as near as a radius.
+While all of a hard ball is within one room, its flight meets nothing. Where it leaves the room, it meets the wall of
+that, if its foot there is seen. Any other flight takes safe steps. Where the foot on a face is seen, it is free until
+it meets the parallel surface. Near an edge it is free for a time that follows from the curvature of the edge. A hidden
+face is not met before its foot may be seen. A hidden edge is not met before its foot may be seen or is as near as a
+radius.
 """
 
 import math
@@ -46,6 +48,7 @@ class RoomFace(Record):
 
     wall: Any
     rooms: Any  # the number of the room, twice
+    number: float  # that of the wall, of all walls of all rooms
     round: Any = None  # the smallest radius of curvature [m]; None where it depends on the place
     slope: float = 0.0  # its steepest decrease along the wall, a length per length
 
@@ -359,6 +362,8 @@ def crossing(one, other, y, far):
 # Where the edge next to a ball is not found, the ball goes this part of its radius. Where an edge is hidden, the ball
 # goes at least this part of the way of its foot: the radius of curvature of an edge is a bound from samples.
 _UNFOUND, _LEAST = 0.05, 0.125
+# A ball that touches a wall of a room is within it, with so many round-offs of a place.
+_WITHIN = 8.0
 
 
 class AtInstant(Record):
@@ -368,12 +373,13 @@ class AtInstant(Record):
     v: Vec
     pull: Vec
 
+    def place(self, t):
+        """The place after a time."""
+        return self.r + t * (self.v + (0.5 * t) * self.pull)
+
     def until_wall(self, grown):
         """The time to the parallel surface of a wall."""
-        if self.pull.x == 0.0 and self.pull.y == 0.0 and self.pull.z == 0.0:
-            time, _meets = grown.first_hit(self.r, self.v)
-        else:
-            time, _meets = grown.falling_hit(self.r, self.v, self.pull)
+        time, _meets = _wall_hit(grown, self)
         return time
 
     def until_rim(self, rim):
@@ -383,6 +389,21 @@ class AtInstant(Record):
     def until_gone(self, way):
         """The least time in which it goes so far."""
         return march.time_to_travel(norm(self.v), norm(self.pull), way)
+
+
+@outlined
+def _wall_hit(grown, flight):
+    """The time to the parallel surface of a wall, and whether an `AtInstant` meets it then."""
+    if flight.pull.x == 0.0 and flight.pull.y == 0.0 and flight.pull.z == 0.0:
+        return grown.first_hit(flight.r, flight.v)
+    return grown.falling_hit(flight.r, flight.v, flight.pull)
+
+
+class WayInRooms(Record):
+    """How long a ball stays within a room, and the number of the wall that it meets then; -1 if it meets none there."""
+
+    time: float
+    number: float
 
 
 class AtInstantInFrame(Record):
@@ -421,6 +442,14 @@ def _look(wall, r, v, pull, t, is_first):
     if not is_first and gap_of(wall.rooms, p) > wall.slack:
         return march.SafeStep(t, math.inf, -1.0, -1.0)
     room = EPSILON * total(absolute(p))
+    way = _in_rooms(wall.rooms, wall.radius, wall.slack, AtInstant(p, w, pull), _WITHIN * room)
+    if way.number >= 0.0:
+        is_own = False
+        for face in wall.faces:
+            is_own = is_own | (face.number == way.number)
+        return march.SafeStep(t, select(is_own, way.time, math.inf), select(is_own, 0.0, -1.0), -1.0)
+    if way.time > 0.0:
+        return march.SafeStep(t, way.time, -1.0, -1.0)
     step = _until_any(wall, AtInstant(p, w, pull), math.inf)
     arrives = (not is_first or step == 0.0) and march.travelled(norm(w), norm(pull), step) <= 2.0 * room
     if arrives and not is_first:
@@ -429,6 +458,36 @@ def _look(wall, r, v, pull, t, is_first):
         if away < wall.radius - room and dot(place - p, w) > 0.0:
             return march.SafeStep(t, 0.0, -1.0, 0.0)
     return march.SafeStep(t, step, select(arrives, 0.0, -1.0), -1.0)
+
+
+@outlined
+def _in_rooms(rooms, radius, slack, flight, near):
+    """The `WayInRooms` of a ball in the room that it stays in the longest; `near` is round-off of its place [m]."""
+    way, own, foot, before = WayInRooms(0.0, -1.0), 0, flight.r, 0.0
+    for k, room in enumerate(rooms):
+        gap = -math.inf
+        for wall in room:
+            gap = max(gap, wall.distance(flight.r))
+        if gap <= near - radius:
+            # All of the ball is within the room, of which each wall has the ball on its side.
+            first, place = WayInRooms(math.inf, -1.0), foot
+            for i, wall in enumerate(room):
+                until, there = _way_to(wall, before + float(i), radius, flight)
+                if until.time < first.time:
+                    first, place = until, there
+            if first.time > way.time:
+                way, own, foot = first, k, place
+        before += float(len(room))
+    is_met = way.number >= 0.0 and is_seen(rooms, (own, own), foot, slack)
+    return way._replace(number=select(is_met, way.number, -1.0))
+
+
+@outlined
+def _way_to(wall, number, radius, flight):
+    """(the `WayInRooms` to one wall with this number, the foot of the ball on the wall then)."""
+    time, meets = _wall_hit(wall.grown(radius), flight)
+    there = flight.place(select(time < math.inf, time, 0.0))
+    return WayInRooms(time, select(meets, number, -1.0)), there - wall.distance(there) * outward(wall, there)
 
 
 @outlined

@@ -160,11 +160,11 @@ def _made(joined: JoinedRooms) -> list[JoinedFaces]:
     rooms = tuple(tuple(wall for _surface, wall in room) for room in each)
     extent = joined.extent()
     slack, bounds = _SLACK * extent, [room_bounds(room) for room in joined.rooms_of]
-    faces = [
-        RoomFace(wall, (k, k), *_bend_of(one, wall))
-        for k, room in enumerate(each) for one, wall in room
-    ]  # fmt: skip
     first = np.cumsum([0, *map(len, rooms)]).tolist()
+    faces = [
+        RoomFace(wall, (k, k), float(first[k] + i), *_bend_of(one, wall))
+        for k, room in enumerate(each) for i, (one, wall) in enumerate(room)
+    ]  # fmt: skip
     group, edges = list(range(len(faces))), []
     tips: list[tuple[int, Vec]] = []
     for edge, (k, a), (m, b) in _edges_of(rooms):
