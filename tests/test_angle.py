@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from conftest import compiled
 
-from swarm.kernel.angle import nearly_sine_and_versine, sine_and_cosine, sine_and_versine
+from swarm.kernel.elementary import nearly_sine_and_versine, sine_and_cosine, sine_and_versine
 from swarm.surfaces.in_motion.drive import LITTLE_ANGLE, wave_of
 
 EPSILON = np.finfo(np.float64).eps

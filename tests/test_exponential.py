@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from conftest import compiled
 
-from swarm.kernel.exponential import exponential, hyperbolic, hyperbolic_tangent, logarithm, power
+from swarm.kernel.elementary import exponential, hyperbolic, hyperbolic_tangent, logarithm, power
 
 RNG = np.random.default_rng(7)
 _SMALL = 10.0 ** RNG.uniform(-300.0, 0.0, 300)

@@ -7,7 +7,7 @@ bits. No branches, and loops of fixed length: a lane loop vectorises.
 import math
 from typing import Any, NamedTuple
 
-from .exponential import logarithm_of
+from .elementary import logarithm_of
 from .jit import select
 from .record import Record
 from .vector import Vec, cross

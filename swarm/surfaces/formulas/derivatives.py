@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import SceneError
-from ...kernel.angle import sine_and_cosine
-from ...kernel.exponential import exponential, hyperbolic, hyperbolic_tangent, logarithm, power
+from ...kernel.elementary import exponential, hyperbolic, hyperbolic_tangent, logarithm, power, sine_and_cosine
 from ..surface import Box, side_sign
 from .expression import COORDINATES, NonSmoothTerm, parse
 from .form import Form

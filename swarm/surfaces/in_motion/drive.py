@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ... import motion as motions
-from ...kernel.angle import nearly_sine_and_versine, sine_and_versine
 from ...kernel.arrays import index
+from ...kernel.elementary import nearly_sine_and_versine, sine_and_versine
 from ...kernel.jit import Array, select
 from ...kernel.limits import EPSILON
 from ...kernel.record import Record

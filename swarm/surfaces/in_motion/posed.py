@@ -8,7 +8,7 @@ rho1 - rho0 = r1 - r0 - (d1 - d0): it is that at a wall at rest, with the free d
 
 from typing import Any
 
-from ...kernel.angle import sine_and_versine
+from ...kernel.elementary import sine_and_versine
 from ...kernel.jit import select
 from ...kernel.vector import Vec, absolute, cross, dot, norm, times, total
 from ..frames import Framed

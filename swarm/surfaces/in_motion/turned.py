@@ -10,7 +10,7 @@ As A1 is A0 turned about the axis k by the angle w h of the step, Cayley's form 
 Where the wall is flat, D is along its normal n and n.Q n = 1: across the wall the end is that of the body at rest.
 """
 
-from ...kernel.angle import sine_and_versine
+from ...kernel.elementary import sine_and_versine
 from ...kernel.vector import Vec, absolute, cross, total
 from .posed import Posed
 

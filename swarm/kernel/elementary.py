@@ -1,6 +1,7 @@
-"""Exponentials and logarithms of sums, products and one quotient: those of a library end a lane loop.
+"""Elementary functions of sums, products and one quotient: those of a library end a lane loop.
 
-Their errors are below 2 ulp, of powers up to 8 too. In Python they take arrays too, of which NumPy computes them.
+The errors of exponentials and logarithms are below 2 ulp, of powers up to 8 too. In Python they take arrays too, of
+which NumPy computes them.
 """
 
 import math
@@ -12,6 +13,19 @@ from .jit import allocating, select
 
 # The sum with it, less it again, is the nearest whole number.
 _WHOLE = 1.5 * 2.0**52
+# pi in three parts, of which the first two leave room for a whole number of 25 bits: up to 1e8 rad their product with
+# it is exact. Beyond, the error is that of the rounding of the angle.
+_PI = (3.141592651605606, 1.9841871479187034e-09, 1.1442377452219664e-17)
+_INVERSE_PI = 0.3183098861837907
+# The minimax polynomials of fdlibm on |y| <= pi/4: (sin y - y)/y^3 and (cos y - 1 + y^2/2)/y^4 in powers of y^2
+_SINE = (
+    -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
+    2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10,
+)  # fmt: skip
+_COSINE = (
+    4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
+    -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11,
+)  # fmt: skip
 _INVERSE_LN2 = 1.4426950408889634
 # ln 2 in two parts: the first has 32 bits, so that its product with an exponent is exact.
 _LN2_HIGH, _LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
@@ -30,6 +44,53 @@ _POWERS = tuple(1 << k for k in range(9, -1, -1))
 _SPLITS = 134217729.0
 # Where tanh is 1 but for round-off.
 _FLAT = 40.0
+
+
+def sine_and_versine(angle):
+    """(sin a, 1 - cos a), the second without cancellation."""
+    return _doubled(*_of_half(angle))
+
+
+def _doubled(n, sine, cosine):
+    """(sin a, 1 - cos a) from (n, sin y, cos y) for a = n pi + 2 y."""
+    # sin a = +-2 sin y cos y and 1 - cos a = 2 sin^2 y where n is even, 2 cos^2 y where it is odd
+    is_odd = _odd(n) != 0.0
+    twice, one = 2.0 * (sine * cosine), select(is_odd, cosine, sine)
+    return select(is_odd, -twice, twice), 2.0 * (one * one)
+
+
+def nearly_sine_and_versine(angle):
+    """The same with an error of some 1e-7, for a guess: half the operations."""
+    n = (angle * _INVERSE_PI + _WHOLE) - _WHOLE
+    y = 0.5 * (angle - n * math.pi)
+    z = y * y
+    sine = y + (y * z) * (-1.0 / 6.0 + z * (1.0 / 120.0 - z * (1.0 / 5040.0)))
+    cosine = 1.0 - z * (0.5 - z * (1.0 / 24.0 - z * (1.0 / 720.0 - z * (1.0 / 40320.0))))
+    return _doubled(n, sine, cosine)
+
+
+def sine_and_cosine(angle):
+    """(sin a, cos a), each with an error of 2 ulp of 1; in Python also of arrays."""
+    n, sine, cosine = _of_half(angle)
+    sign = 1.0 - 4.0 * abs(_odd(n))
+    return sign * (2.0 * (sine * cosine)), sign * ((cosine - sine) * (cosine + sine))
+
+
+def _of_half(angle):
+    """(n, sin y, cos y) for a = n pi + 2 y."""
+    n = (angle * _INVERSE_PI + _WHOLE) - _WHOLE
+    y = 0.5 * (((angle - n * _PI[0]) - n * _PI[1]) - n * _PI[2])
+    z = y * y
+    a, b, c, d, e, f = _SINE
+    sine = y + (y * z) * (a + z * (b + z * (c + z * (d + z * (e + z * f)))))
+    a, b, c, d, e, f = _COSINE
+    return n, sine, 1.0 - (0.5 * z - z * z * (a + z * (b + z * (c + z * (d + z * (e + z * f))))))
+
+
+def _odd(n):
+    """+-1/2 of an odd number, 0 of an even one."""
+    half = 0.5 * n
+    return (half + _WHOLE) - _WHOLE - half
 
 
 def _split(a):
