@@ -333,7 +333,7 @@ class BodyRun(BaseRun):
             pushed = np.concatenate([pushed, *passed])
         if bodies.image is not None:
             # The books are of places in the cell.
-            whole = self._mass * self._falls @ bodies.image[:, some]
+            whole = np.einsum("x,xn->n", self._mass * self._falls, bodies.image[:, some])
             fall, total = fall + whole, total + whole
         numbers = (kinetic, fall, elastic, total, lost, bodies.sliding[some], work)
         depth = self._depths(some, r, moment).max(initial=0.0) if len(self._body.contacts) else 0.0

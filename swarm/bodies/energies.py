@@ -33,13 +33,11 @@ class BodyEnergies:
 
     def kinetic(self, v: Floats) -> Floats:
         """Of all points."""
-        moving = np.tensordot(self._ties.mass, v, axes=(1, 1))  # (P, 3, n)
-        return np.asarray(0.5 * (moving.transpose(1, 0, 2) * v).sum(axis=(0, 1)))
+        return np.asarray(0.5 * (np.einsum("pq,xqn->xpn", self._ties.mass, v) * v).sum(axis=(0, 1)))
 
     def fall(self, r: Floats) -> Floats:
         """In the field of gravity."""
-        center = np.tensordot(self._ties.mass.sum(axis=1), r, axes=(0, 1))
-        return np.asarray(-(self._gravity @ center))
+        return np.asarray(-np.einsum("x,xn->n", self._gravity, np.einsum("p,xpn->xn", self._ties.mass.sum(axis=1), r)))
 
     def stored(self, r: Floats) -> Floats:
         """Of springs, of the strain, and of walls that are springs."""
@@ -52,7 +50,7 @@ class BodyEnergies:
         if self._body.strain is not None:
             edges = self._body.strain.edges
             strain = squares_between(r, edges) - self._ties.rest[-len(edges) :, None]
-            total += 0.5 * (strain * (self._body.strain.stiffness @ strain)).sum(axis=0)
+            total += 0.5 * (strain * np.einsum("ij,jn->in", self._body.strain.stiffness, strain)).sum(axis=0)
         return total
 
     def _in_walls(self, r: Floats) -> Floats:
@@ -71,18 +69,18 @@ class BodyEnergies:
         """Kinetic and potential energy of led points themselves."""
         led = led_points(self._body)
         r, v, mass = r[:, led], v[:, led], self._ties.mass[np.ix_(led, led)]
-        moving = np.tensordot(mass, v, axes=(1, 1)).transpose(1, 0, 2)
-        fall = np.tensordot(mass.sum(axis=1), r, axes=(0, 1))
-        return np.asarray(0.5 * (moving * v).sum(axis=(0, 1)) - self._gravity @ fall)
+        moving = np.einsum("pq,xqn->xpn", mass, v)
+        fall = np.einsum("x,xn->n", self._gravity, np.einsum("p,xpn->xn", mass.sum(axis=1), r))
+        return np.asarray(0.5 * (moving * v).sum(axis=(0, 1)) - fall)
 
     def momenta(self, r: Floats, v: Floats) -> tuple[Floats, Floats]:
         """The momentum of all copies together, and their angular momentum."""
-        momentum = np.tensordot(self._ties.mass, v, axes=(1, 1)).transpose(1, 0, 2)
+        momentum = np.einsum("pq,xqn->pxn", self._ties.mass, v).transpose(1, 0, 2)
         return momentum.sum(axis=(1, 2)), np.cross(r, momentum, axis=0).sum(axis=(1, 2))
 
     def contact_points(self, r: Floats) -> Floats:
         """(3, K, n)."""
-        return np.tensordot(self._body.contacts, r, axes=(1, 1)).transpose(1, 0, 2)
+        return np.asarray(np.einsum("kp,xpn->xkn", self._body.contacts, r))
 
 
 def summed(

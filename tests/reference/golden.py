@@ -54,6 +54,8 @@ changes are 2e-2, with 2e-3 for contacts that leave others as they are, not 1e-2
 Two cells of balls in a union were written again when flights within one room took one look at its end: the same ends by
 the bits, and one number more for each wall of a room. So was one of balls in a mesh that swings when its triangles were
 met by steps to planes: the same impacts, 2e-15 at its end.
+One cell of bodies was written again when the sums of their energies left BLAS: the same end by the bits, and the same
+bits of energies on each processor.
 
 The runs "cell: ..." are those of cells of `bench.cells` that work, one kind of wall for each engine and capability, and
 their digests are of the final state, the observables and the datasets of the trajectory, but for dates, versions,
