@@ -32,7 +32,7 @@ GROUPS: dict[str, str] = {
     "exports": "obj|ply|vtkhdf|xyz",
     "files": "appended|checkpoint|checksums|impact_log|impacts|replaced|storage|stored|superblock|trajectory|writer",
     "grains": "",
-    "kernel": "angle|arrays|fours|gravity|heap|random|vector",
+    "kernel": "arrays|elementary|fours|gravity|heap|random|vector",
     "lanes": "",
     "methods": "",
     "motion": "",

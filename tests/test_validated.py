@@ -87,7 +87,7 @@ def test_help_shows_no_check(kind):
         (swarm.Capsule, "length", {"radius": 1.0}), (swarm.Sphere, "restitution", {"radius": 1.0}),
         (swarm.Penalty, "dt", {"penalty": 1.0}), (swarm.Impact, "sliding_tolerance", {}),
         (swarm.Oscillation, "frequency", {"amplitude": (0.0, 0.0, 1.0)}), (swarm.Pairs, "friction", {}),
-        (swarm.Source, "mass", {"where": 0, "rate": 1.0, "speed": 1.0}),
+        (swarm.Slab, "half_width", {"normal": (0.0, 0.0, 1.0)}),
     ],
     ids=lambda one: one if isinstance(one, str) else "",
 )  # fmt: skip

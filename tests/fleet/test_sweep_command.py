@@ -88,10 +88,15 @@ def test_a_process_starts_before_the_file_is_read_and_ends_with_its_error(tmp_pa
 
 def test_an_interrupt_of_the_imports_ends_the_process_that_has_started(tmp_path, monkeypatch, capsys):
     calls = []
+    # Python leaves a signal ignored that the process which started it ignores.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     monkeypatch.setattr(processes.Place, "start", lambda place: signal.raise_signal(signal.SIGINT))
     monkeypatch.setattr(processes.Place, "close", lambda place: calls.append("close"))
-    with pytest.raises(click.exceptions.Exit) as end:
-        sweep(tmp_path / "none.toml")
+    try:
+        with pytest.raises(click.exceptions.Exit) as end:
+            sweep(tmp_path / "none.toml")
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert end.value.exit_code == 130
     assert calls == ["close"]
     assert "interrupted" in capsys.readouterr().err

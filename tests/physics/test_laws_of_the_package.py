@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 from energy_books import unbooked
-from physics.test_wall_laws import KOLMOGOROV, kolmogorov, same_bits
+from physics.test_wall_laws import KOLMOGOROV, kolmogorov
+from same_bits import require_same
 from scipy.optimize import brentq
 from scipy.special import ndtr
 from test_sessions import require_resumed_is_whole
@@ -408,10 +409,9 @@ def test_the_books_balance_and_bits_are_the_same(name):
         return
     one, two = (run(300, compile="always", threads=threads, block_size=256) for threads in (1, 2))
     require_books(one, scene)
-    assert same_bits(one, two)
-    assert np.array_equal(one.absorbed_time, two.absorbed_time, equal_nan=True)
+    require_same(one, two)
     few, plain = run(16, compile="always"), run(16, compile="never")
-    assert same_bits(few, plain)
+    require_same(few, plain)
     assert np.array_equal(few.absorbed_time, one.absorbed_time[:16], equal_nan=True)
 
 
@@ -437,8 +437,7 @@ def test_a_cluster_gives_the_same_bits(tmp_path):
         swarm.simulate(scene, start, swarm.Impact(), until=3.0, every=0.5, trajectory=tmp_path / f"{k}.h5", **how)
         for k, how in enumerate(({}, {"cluster": "local:2", "shards": 3}))
     ]
-    assert same_bits(*runs)
-    assert np.array_equal(runs[0].absorbed_time, runs[1].absorbed_time, equal_nan=True)
+    require_same(*runs)
     with swarm.load(tmp_path / "1.h5") as written:
         assert np.array_equal(written.absorbed_times(-1), runs[0].absorbed_time, equal_nan=True)
 

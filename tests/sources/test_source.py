@@ -50,6 +50,8 @@ def without(*names, **more):
         (without("speed", beam=(0, 0, 1), divergence=4.0), "divergence must be below pi"),
         (without(divergence=0.1), "divergence must go with a beam"),
         (without(mass=0.0), "mass must be from"),
+        (without(mass="x"), "mass must be .*, got"),
+        (without(mass=math.nan), "mass must be"),
         (without(volume=1), "volume must be true or false"),
         (without(within=3), "within must be a surface"),
     ],
