@@ -52,12 +52,13 @@ from .vessel import met
 
 def rising(wall, r0, q0, move):
     """The `Closing` of a ball at r0 and a wall over a step, where the centre moves so."""
-    r1 = r0 + move
+    r1, turns = r0 + move, isinstance(wall, Posed) and wall.pose.turn is not None
+    if wall.flat and not turns:
+        # The gap is linear in the place, and needs no roots of q.
+        gradient = wall.gap_gradient(r0, r1)
+        return Closing(-1.0 * gradient, dot(gradient, move - wall.displacement()))
     gradient = wall.resting_gradient(r0, r1)
-    if isinstance(wall, Posed) and wall.pose.turn is not None:
-        risen = wall.end_inner(r1) - q0
-    else:
-        risen = dot(gradient, move - wall.displacement())
+    risen = wall.end_inner(r1) - q0 if turns else dot(gradient, move - wall.displacement())
     slope, _bend = wall.gap_slope(q0, q0 + risen)
     return Closing(-slope * gradient, slope * risen)
 

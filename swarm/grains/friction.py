@@ -16,6 +16,7 @@ import math
 from ..contact.wall_impact import give_work
 from ..kernel.arrays import index
 from ..kernel.jit import outlined, select
+from ..kernel.limits import EPSILON
 from ..kernel.vector import ZERO, cross, dot, square
 from ..surfaces.in_motion.posed import Posed
 from .at_walls import press_at_wall, rising, velocity_at_end
@@ -39,6 +40,9 @@ from .grain_arrays import (
     vector_at,
 )
 from .vessel import met, moves
+
+# The square of the length of a unit vector is this near to 1.
+_UNIT = 8.0 * EPSILON
 
 
 def across(a, n):
@@ -77,8 +81,10 @@ def _facing(own, way, radius, r0, move):
 
     The normal is 0 where a step goes from one side of a slab to the other as far: what its ends store is the same.
     """
-    size2 = square(way.along)
-    n = way.along * (1.0 / math.sqrt(select(size2 > 0.0, size2, 1.0)))
+    n, size2 = way.along, square(way.along)
+    # At a flat wall `along` is the normal, but in a step from one side of a slab to the other.
+    if not (own.flat and abs(size2 - 1.0) <= _UNIT):
+        n = n * (1.0 / math.sqrt(select(size2 > 0.0, size2, 1.0)))
     return n, _carried(own, r0 - radius * n, r0 + move - radius * n)
 
 

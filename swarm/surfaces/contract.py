@@ -341,6 +341,11 @@ class Smooth(AtRest):
         rest = self.difference(r0, r1) - g.x * d.x - g.y * d.y - g.z * d.z
         return g + (rest / select(d2 > 0.0, d2, 1.0)) * d
 
+    def gap_gradient(self, r0, r1):
+        """Discrete gradient of the gap g: D.(r1 - r0) = g1 - g0."""
+        slope, _bend = self.gap_slope(self.inner(r0), self.inner(r1))
+        return slope * self.discrete_gradient(r0, r1)
+
     def resting_gradient(self, r0, r1):
         """The discrete gradient, but grad q(m) where that satisfies D.(r1 - r0) = q1 - q0 up to round-off.
 

@@ -42,6 +42,7 @@ _FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
     ("entry", ("gravity", "place", "velocity"), None),
     ("end_inner", ("end",), None),
     ("discrete_gradient", ("place", "end"), "normal"),
+    ("gap_gradient", ("place", "end"), "normal"),
     ("resting_gradient", ("place", "end"), "normal"),
     ("step_normal", ("place", "end"), "normal"),
     ("push", ("place", "way", None), "end"),

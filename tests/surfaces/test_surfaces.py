@@ -9,6 +9,7 @@ from conftest import (
     EPSILON,
     ITERATED,
     QUADRIC_WALLS,
+    WALLS,
     call,
     chord_of,
     directions,
@@ -138,6 +139,30 @@ def test_inner_gradient_is_a_discrete_gradient(name, first, second, scale):
         rise = surface.inner(vec(end)) - surface.inner(vec(start))
         slope = np.linalg.norm(call(surface.discrete_gradient, first, first)) + np.linalg.norm(discrete)
         assert abs(exact @ (end - start) - rise) <= 16 * EPSILON * slope * scale
+
+
+@every_wall
+@given(first=directions, second=directions, scale=scales)
+def test_gap_gradient_is_a_discrete_gradient_of_the_gap(name, first, second, scale):
+    """D.(r1 - r0) = g1 - g0, to the round-off of gaps."""
+    surface, first, second = numbers_of(name, scale), scale * first, scale * second
+    discrete = np.array(call(surface.gap_gradient, first, second))
+    rise = gap(surface, second) - gap(surface, first)
+    slope = np.linalg.norm(call(surface.gradient, first)) + np.linalg.norm(call(surface.gradient, second))
+    assert abs(discrete @ (second - first) - rise) <= 32 * EPSILON * slope * scale
+
+
+@pytest.mark.parametrize("name", [name for name in WALLS if name.startswith(("plane", "slab"))])
+@given(first=directions, second=directions, scale=scales)
+def test_gap_gradient_of_a_flat_wall_is_its_normal(name, first, second, scale):
+    """Exactly, where a step stays on one side."""
+    surface, first, second = numbers_of(name, scale), scale * first, scale * second
+    normals = [np.array(call(surface.gradient, r)) for r in (first, second)]
+    discrete = np.array(call(surface.gap_gradient, first, second))
+    if (normals[0] == normals[1]).all():
+        assert (discrete == side_of(surface) * normals[0]).all()
+    else:
+        assert np.linalg.norm(discrete) <= 1.0 + 4 * EPSILON
 
 
 @every_wall

@@ -110,7 +110,7 @@ class Flat(ExactChord):
     def discrete_gradient(self, r0, r1):
         return self.normal
 
-    step_normal = discrete_gradient
+    gap_gradient = step_normal = discrete_gradient
 
     def push(self, r0, p, kappa):
         return r0 + (p - kappa * self.normal)

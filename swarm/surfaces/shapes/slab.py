@@ -233,6 +233,12 @@ class SlabNumbers(Distance, ExactChord):
         # q is quadratic, so its gradient at the midpoint is a discrete gradient, exactly.
         return self.scaled(self.off(r0) + self.off(r1))
 
+    def gap_gradient(self, r0, r1):
+        # (|s1| - |s0|)/(s1 - s0) = (s0 + s1)/(|s0| + |s1|), which is 1 or -1 exactly on one side of the middle
+        s0, s1 = self.off(r0), self.off(r1)
+        both = abs(s0) + abs(s1)
+        return self.scaled(self.side * (s0 + s1) / select(both > 0.0, both, 1.0))
+
     def step_normal(self, r0, r1):
         return self.unit_normal(r0)
 
