@@ -314,6 +314,13 @@ class Scene:
         at_start = np.isfinite(self.bounds()).all()
         return not (at_start and (not self.has_doors() or np.isfinite(self._bounds_of_lasting(self.surfaces)).all()))
 
+    def is_open_upwards_only(self) -> bool:
+        """Whether gravity pulls particles back from each side on which the scene is open, as into a glass."""
+        if self.gravity is None or self.has_doors() or self.pieces.open_volumes() or len(self.open_faces()):
+            return False
+        (low, high), pull = self.bounds(), np.array(self.gravity)
+        return not (np.isinf(low) & (pull <= 0.0) | np.isinf(high) & (pull >= 0.0)).any()
+
     def poses(self, time: float) -> list[motions.Pose]:
         """The pose of every surface at a time [s].
 

@@ -168,6 +168,13 @@ def test_walls_in_one_place_are_reported(name, caplog):
     assert words in sentence
 
 
+def test_a_field_hides_no_wall_that_is_listed_after_it(caplog):
+    posts = swarm.Boxes([[0.5 * k, 0.0, 0.2] for k in range(200)], POST.half_widths)
+    lid = swarm.Box((200.0, 1.0, 1.0), center=(0.0, 0.0, 1.0))
+    (sentence,) = hints_of_walls([posts, lid, swarm.Plane((0.0, 0.0, 1.0), 2.0, restitution=0.5)], caplog)
+    assert "surfaces[1] (Box) and surfaces[2] (Plane) have faces in one place" in sentence
+
+
 @pytest.mark.parametrize("name", NOT_IN_ONE_PLACE)
 def test_other_walls_are_not(name, caplog):
     assert hints_of_walls(NOT_IN_ONE_PLACE[name], caplog) == []

@@ -1,5 +1,7 @@
 """Frames, blocks, threads, and what is refused."""
 
+from dataclasses import replace
+
 import numba
 import numpy as np
 import pytest
@@ -364,6 +366,30 @@ def test_an_open_scene_is_reported_once_and_escaped_particles_are_counted(caplog
     closed = swarm.simulate(SPHERE, swarm.fill(SPHERE, 5, speed=1.0), swarm.Impact(), until=1.0)
     assert not caplog.records
     assert closed.observables["escaped"][-1] == 0
+
+
+DOWN = (0.0, 0.0, -9.81)
+GLASS = swarm.Box((0.5, 0.5, 0.5), open=["+z"])
+OPEN = {
+    "a glass": ([GLASS], DOWN, False),
+    "a tube on a floor": ([swarm.Cylinder(0.5), swarm.Plane((0.0, 0.0, -1.0), 0.5)], DOWN, False),
+    "a glass that leans": ([GLASS], (3.0, 0.0, -9.0), False),
+    "a glass upside down": ([GLASS], (0.0, 0.0, 9.81), True),
+    "a glass without gravity": ([GLASS], None, True),
+    "a floor": ([swarm.Plane((0.0, 0.0, -1.0), 0.5)], DOWN, True),
+    "a side": ([swarm.Box((0.5, 0.5, 0.5), open=["+x"])], DOWN, True),
+    "a hole": ([replace(GLASS, openings=[swarm.Sphere(0.2, (0.0, 0.0, -0.5))])], DOWN, True),
+    "a glass that goes": ([replace(GLASS, present=[(0.0, 1.0)])], DOWN, True),
+}
+
+
+@pytest.mark.parametrize("name", OPEN)
+def test_a_scene_is_not_reported_as_open_where_gravity_pulls_all_particles_back(name, caplog):
+    surfaces, gravity, is_said = OPEN[name]
+    start = swarm.Particles((-0.1, 0.2, 0.3), (3.0, 0.1, 2.0))
+    result = swarm.simulate(swarm.Scene(surfaces, gravity), start, swarm.Impact(), until=20.0, compile="never")
+    assert ("the scene is open" in caplog.text) == is_said
+    assert is_said or result.observables["escaped"][-1] == 0
 
 
 def test_a_run_in_two_parts_is_the_run():

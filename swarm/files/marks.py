@@ -16,6 +16,13 @@ _HEAD = 4096
 # The entry of the metadata of a picture that names the program that drew it, by the suffix.
 _DRAWN_BY = {".png": "Software", ".pdf": "Creator", ".svg": "Creator"}
 _PROGRAM, _HDF5 = "swarm", b"\x89HDF\r\n\x1a\n"
+# What is said where one of these has a name of another format: of `_FORMATS`, or one that is not written.
+_HDF5_FILES = {
+    "trajectory": "it is HDF5; write other formats of it after the run: swarm export RUN.h5 -o RUN.csv (or .vtkhdf, "
+    ".xyz, .gsd, .ply, .obj)",
+    "impacts": "the log is HDF5, which swarm.load_impacts reads",
+}
+_OTHERS = (".npy", ".npz", ".vtk", ".vtp", ".vtu", ".pdb", ".lammpstrj", ".json", ".parquet", ".mat", ".stl", ".rrd")
 _COLUMNS_OF_CSV = b"frame,time,id,x,y,z,vx,vy,vz,mass"
 _COLUMNS_OF_TABLE = {"file", "state", "error", "wall_time"}
 
@@ -38,6 +45,8 @@ def check_target(path: Path, overwrite: bool, what: str = "trajectory", allow: s
     """
     overwrite = flag("overwrite", overwrite)
     paths.check_place(path, what)
+    if what in _HDF5_FILES and path.suffix.lower() in (*_FORMATS, *_OTHERS):
+        raise SceneError(f"{what}: expected a name that ends in .h5, got {path}; {_HDF5_FILES[what]}")
     if path.exists() and not overwrite:
         stopped = what == "trajectory" and paths.checkpoint_of(path).exists()
         on = ", or go on with it, which was stopped (--resume, resume=True)" if stopped else ""

@@ -132,6 +132,8 @@ class RecordingWriter:
         self._seen: list[dict[str, Any]] = []
         # Where walls come and go they are sent from each instant on, of which this is the number.
         self._has_doors, self._instant = scene.has_doors() and not scene.moves(), -1
+        # How many have come by the last frame, where some come during the run and all of them are seen.
+        self._came: int | None = None
         self._failed = False
         # Where it is written: until it is whole another name, if it is made of a trajectory.
         self.file = path
@@ -235,6 +237,8 @@ class RecordingWriter:
             lines.append(tints)
             self._rows.append((number, moment, seen))
             self._seen.append({**seen, "time": moment})
+        if self._fed and len(chosen[-1][2].position[0]) == self.count:
+            self._came = int(np.count_nonzero(~np.isnan(chosen[-1][2].position[0])))
         points = rows(shown, np.float32)
         try:
             self._send_points(numbers, times, points, np.array(colour), np.array(lines))
@@ -255,8 +259,8 @@ class RecordingWriter:
     def _log_outcome(self) -> None:
         """Log the run in words, as plots have it above and below."""
         seen = {name: np.array([row[name] for row in self._seen]) for name in self._seen[0]}
-        known = {"start": self._start}
-        looks.log_outcome(self.stream, Content("", self._scene, self._method, self._body, self.count, seen, known))
+        known, count = {"start": self._start}, self.count if self._came is None else self._came
+        looks.log_outcome(self.stream, Content("", self._scene, self._method, self._body, count, seen, known))
 
     def _send_points(self, numbers: Any, times: Any, points: Any, colour: Any, lines: Any) -> None:
         """Send points (frames, n, 3) with their colours, and what ties them together."""

@@ -83,7 +83,7 @@ class Columns:
 
 def carry_out_task(task: Task, session: Session) -> RunEnd:
     """Carry out a checked run, frame by frame."""
-    if task.scene.is_open() and not task.is_shard:
+    if task.scene.is_open() and not task.scene.is_open_upwards_only() and not task.is_shard:
         warn_open()
     if not task.is_shard:
         hints.give(task)

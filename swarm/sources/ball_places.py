@@ -1,5 +1,6 @@
 """The places at which balls of a source may be born, in blocks that are drawn when they are needed."""
 
+import logging
 from dataclasses import replace
 
 import numpy as np
@@ -13,14 +14,16 @@ from .births import PLACES, VELOCITIES, from_surface, from_volume, require_beam,
 from .places import PointBatches, changes, place_of
 from .source import Source
 
+_LOG = logging.getLogger("swarm")
 # Places of a block; so many rounds of as many places are tried for one.
 _BLOCK, _MOST_ROUNDS = 1024, 256
 # A ball that is born at a wall is so much of its radius away from it.
 _CLEAR = 1e-9
-# What came, by the argument that can be changed: of balls, and of bodies, which are as large as they are.
+# What to do, and what came, by the argument that can be changed: of balls, and of bodies, whose size is given.
+_MEND = {"radius": "use smaller balls, or a larger source", "where": "move it, or make it larger"}
 _LACKING = {
-    "radius": "got {:g} m, for which none of {} random places is; use smaller balls, or a larger source",
-    "where": "got none for the ball of {:g} m around a body, of {} random places; move it, or make it larger",
+    "radius": "got {:g} m, for which none of {} random places is; ",
+    "where": "got none for the ball of {:g} m around a body, of {} random places; ",
 }
 
 
@@ -34,6 +37,9 @@ class BallPlaces:
         seed: of the run.
         sized: the argument of the source that a sentence asks to change.
 
+    Attributes:
+        found: how many places of the last block differ; where there is hardly room for the ball they come again.
+
     Raises:
         SceneError: there is no such place, or a beam does not lead into the vessel.
     """
@@ -44,10 +50,10 @@ class BallPlaces:
         require_in_plane(scene, source, name)
         self._place = place_of(scene, source, name)
         self._points = PointBatches(scene, self._place, name)
-        self._radius, self._across = source.largest(), scene.across()
+        self.radius, self._across = source.largest(), scene.across()
         # Of those of the scene the ball is inside of, not half of it.
         is_wall = self._place.number is not None or bool(self._place.walls)
-        self._shift = (1.0 + _CLEAR) * self._radius if is_wall and not self._place.volume else 0.0
+        self._shift = (1.0 + _CLEAR) * self.radius if is_wall and not self._place.volume else 0.0
         self._lasting = [i for i, one in enumerate(scene.surfaces) if not changes(one)]
         self._known = -1
         self.block(0)
@@ -80,8 +86,10 @@ class BallPlaces:
         if not count:
             raise SceneError(
                 f"{self._name}.{self._sized} must leave a place within the walls, "
-                + _LACKING[self._sized].format(self._radius, _MOST_ROUNDS * _BLOCK)
+                + _LACKING[self._sized].format(self.radius, _MOST_ROUNDS * _BLOCK)
+                + _MEND[self._sized]
             )
+        self.found = count
         points, normals = np.resize(np.concatenate(found, axis=1).T, (_BLOCK, 6)).T.reshape(2, 3, _BLOCK)
         velocity = self._velocities(speeds, points, normals)
         if self._across is not None:
@@ -92,7 +100,7 @@ class BallPlaces:
         """Whether the largest ball is within all walls that are at rest."""
         if not self._lasting:
             return np.ones(points.shape[1], np.bool_)
-        radius = np.full(points.shape[1], self._radius)
+        radius = np.full(points.shape[1], self.radius)
         return np.asarray((self._scene.distances_outside(points, 0.0, radius)[self._lasting] <= 0.0).all(axis=0))
 
     def _velocities(self, random: Random, points: Floats, normals: Floats) -> Floats:
@@ -118,6 +126,12 @@ def place_unborn(scene: Scene, particles: Particles, seed: int, sized: str = "ra
     for k, places in enumerate(ball_places(scene, particles, seed, sized)):
         assert particles.births is not None
         own = np.flatnonzero(particles.births.source == k)
+        if places.found < min(_BLOCK, len(own)):
+            _LOG.warning(
+                "sources[%d]: only %d of %d random places have room within the walls for a ball of %g m, and births "
+                "use these again: they are not uniform; %s", k, places.found, _MOST_ROUNDS * _BLOCK, places.radius,
+                _MEND[sized],
+            )  # fmt: skip
         position, velocity = places.block(0)
         some = np.arange(len(own)) % position.shape[1]
         particles.position[:, own], particles.velocity[:, own] = position[:, some], velocity[:, some]

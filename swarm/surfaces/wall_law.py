@@ -115,7 +115,10 @@ def leave_of(given):
 def checked_laws(name: str, given: Any) -> tuple[Any, ...]:
     """Laws as kernels take them, their fields as floats; a str is the name that a file has of a law."""
     if isinstance(given, (WallLaw, str)) or not isinstance(given, (tuple, list)):
-        raise SceneError(f"{name} must be a list of WallLaw, got {shown(given)}")
+        raise SceneError(
+            f"{name} must be a list of WallLaw, such as [swarm.Lambert()], in a scene file {name.rpartition('.')[2]} = "
+            f'[{{kind = "lambert"}}], got {shown(given)}'
+        )
     return tuple(law if isinstance(law, str) else _checked(f"{name}[{k}]", law) for k, law in enumerate(given))
 
 

@@ -2,6 +2,7 @@
 
 import functools
 import math
+import re
 
 import h5py
 import numpy as np
@@ -213,6 +214,17 @@ def test_a_source_without_a_radius_has_that_of_the_grains_at_the_start():
     must = "must be given where the particles of the start have"
     assert refusal(0.007, [0.01, 0.012]) == f"sources[0].radius {must} radii from 0.01 to 0.012 m, got None"
     assert refusal([0.007, 0.008], 0.012) == f"sources[0].mass {must} masses from 0.007 to 0.008 kg, got None"
+
+
+@pytest.mark.parametrize(("radius", "is_said"), [(0.02, False), (0.027, True)])
+def test_births_that_take_the_same_places_again_are_said_once(caplog, radius, is_said):
+    scene = swarm.Scene([swarm.Box((0.03, 0.03, 0.03))])
+    source = swarm.Source(0, volume=True, rate=4e5, even=True, speed=0.1, radius=radius, mass=0.007)
+    swarm.simulate(scene, None, SOFT, sources=source, until=2e-3, compile="never", seed=2)
+    said = [message for message in caplog.messages if "random places" in message]
+    assert len(said) == is_said
+    # A place is within the box of the centres with the probability 0.1^3.
+    assert not said or 262 - 65 < int(re.search(r"only (\d+) of 262144", said[0])[1]) < 262 + 65
 
 
 def test_arguments():

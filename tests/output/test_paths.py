@@ -25,6 +25,20 @@ def test_what_is_no_path(name, value):
         swarm.simulate(SPHERE, START, swarm.Impact(), until=1.0, **{name: value})
 
 
+@pytest.mark.parametrize("name", ["a.npz", "a.XYZ", "a.b.csv"])
+def test_a_name_of_another_format_is_refused(tmp_path, name):
+    with pytest.raises(
+        swarm.SceneError, match=r"trajectory: .* ends in \.h5, .* is HDF5; .*swarm export RUN\.h5 -o RUN\.csv"
+    ):
+        run(tmp_path / name)
+    with pytest.raises(
+        swarm.SceneError, match=r"impacts: .* ends in \.h5, .* is HDF5, which swarm\.load_impacts reads"
+    ):
+        run(None, impacts=tmp_path / name)
+    assert os.listdir(tmp_path) == []
+    run(tmp_path / "run.2")
+
+
 @pytest.mark.parametrize("recording", ["run.h5", "./run.h5", "link.h5", "run.h5.checkpoint"])
 def test_two_outputs_are_two_files(tmp_path, monkeypatch, recording):
     monkeypatch.chdir(tmp_path)

@@ -278,7 +278,8 @@ def test_a_law_that_sends_a_particle_into_the_wall_ends_the_run(tier):
 @pytest.mark.parametrize(
     ("laws", "sentence"),
     [
-        (Restitution(0.9), "laws must be a list of WallLaw, got Restitution"),
+        (Restitution(0.9), "laws must be a list of WallLaw, .*, got Restitution"),
+        ("lambert", r'in a scene file laws = \[\{kind = "lambert"\}\], got \'lambert\''),
         ([0.5], r"laws\[0\] must be a WallLaw, .* got 0.5"),
         ([Restitution(0.9), Nothing(1.0)], r"laws\[1\] must have a method leave\(self, v, n, u, random, mass\)"),
         ([Restitution(math.nan)], r"laws\[0\].e must be a finite number, got nan"),

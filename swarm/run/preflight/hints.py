@@ -251,7 +251,7 @@ def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
         return
     from ...surfaces.presence import flush  # loaded where there are two walls
 
-    bodies = list(itertools.islice(flush.bodies_of(scene.surfaces), flush.MOST_BODIES))
+    bodies = flush.first_bodies(scene.surfaces)
     surfaces, size, across = [one.body for one in bodies], scene.extent() or 1.0, scene.across()
 
     def matters(one: Surface, other: Surface, are_back_to_back: bool) -> bool:

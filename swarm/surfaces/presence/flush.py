@@ -128,6 +128,17 @@ def bodies_of(surfaces: Sequence[Surface]) -> Iterator[OneBody]:
             yield OneBody(i, k, replace(body, **laws))
 
 
+def first_bodies(surfaces: Sequence[Surface]) -> list[OneBody]:
+    """As `bodies_of`, with so many at most that are listed, and as many of fields: a field hides no wall after it."""
+    left = {True: MOST_BODIES, False: MOST_BODIES}
+    found = []
+    for one in bodies_of(surfaces):
+        left[one.row is None] -= 1
+        if left[one.row is None] >= 0:
+            found.append(one)
+    return found
+
+
 def may_reach(one: OneBody, surfaces: Sequence[Surface]) -> bool:
     """Whether it is made to reach into a wall on which it stands."""
     return one.row is None or surfaces[one.surface].body_count() <= MOST_BODIES
