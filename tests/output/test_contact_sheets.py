@@ -9,6 +9,8 @@ import swarm
 from swarm.pictures import graphs, plots, series
 from swarm.pictures.eye import Eye
 from swarm.recording import looks, playback, sheet
+from swarm.recording.recorded import record
+from swarm.recording.writer import Settings
 from swarm.triangles.shapes import shapes_of
 from swarm.words import titles as words
 from swarm.words import verdicts
@@ -77,21 +79,19 @@ def test_of_more_particles_than_are_drawn_the_number_is_reported(tmp_path):
     assert sheet.title_of_sheet(held).endswith("10 000 of 20 000 particles are drawn")
 
 
-@pytest.mark.parametrize("afterwards", [False, True])
-def test_only_those_that_came_are_counted(tmp_path, afterwards):
+def test_only_those_that_came_are_counted(tmp_path):
     source = swarm.Source(0, volume=True, rate=1e4, even=True, speed=0.1, radius=0.1, mass=1.0, blocked="wait")
-    names = {"trajectory": tmp_path / "run.h5", "recording": tmp_path / "run.rrd"}
     swarm.simulate(
         swarm.Scene([swarm.Box((0.3, 0.3, 0.3))]), None, swarm.Penalty(dt=1e-3, penalty=1e4), sources=source,
-        until=0.01, every=2e-3, compile="never", **names,
+        until=4e-3, every=2e-3, compile="never", trajectory=tmp_path / "run.h5", recording=tmp_path / "run.rrd",
     )  # fmt: skip
-    with swarm.load(names["trajectory"]) as trajectory:
-        if afterwards:
-            trajectory.record(names["recording"], overwrite=True)
+    with swarm.load(tmp_path / "run.h5") as trajectory:
+        record(trajectory, tmp_path / "later.rrd", Settings())
         born, count = trajectory.observables["born"][-1].sum(), trajectory.count
     assert 1 < born < count
-    title = playback.Playback(names["recording"]).about["title"]
-    assert title.startswith(f"{born} balls of 10 cm radius from sources in a box")
+    for name in ("run.rrd", "later.rrd"):
+        title = playback.Playback(tmp_path / name).about["title"]
+        assert title.startswith(f"{born} balls of 0.1 m radius from sources in a box")
 
 
 @pytest.mark.usefixtures("older")
