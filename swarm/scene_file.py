@@ -2,7 +2,7 @@
 
 import dataclasses
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -48,6 +48,7 @@ class ParticlesTable(Validated):
     exact: Flag | None = None
     radius: float | list[float] | None = None
     fraction: Part | None = None
+    within: Any = None
     source: str | None = dataclasses.field(default=None, metadata={"key": "from"})
     frame: int | None = None
 
@@ -66,11 +67,14 @@ class ParticlesTable(Validated):
             seed=self.seed or 0,
             exact=bool(self.exact),
             radius=self.radius,
+            within=self.within,
         )
 
     def _packed(self, scene: Scene) -> Particles:
         from .events.packing import pack  # which imports the engine
 
+        if self.within is not None:
+            raise SceneError("within must be left out with a fraction, which is of all the volume; use count")
         if self.exact:
             raise SceneError("exact must be left out with a fraction, got true: use temperature alone")
         return pack(
@@ -342,8 +346,10 @@ def _body(table: Any) -> "BodiesFile | Made":
 
 
 def _particles(given: Any) -> ParticlesTable:
+    if isinstance(given, Mapping) and "within" in given:
+        given = {**given, "within": tables.surface_of(given["within"], "particles.within")}
     table = tables.convert(given, ParticlesTable, "particles")
-    filled = ("count", "speed", "temperature", "mass", "seed", "exact", "radius", "fraction")
+    filled = ("count", "speed", "temperature", "mass", "seed", "exact", "radius", "fraction", "within")
     if table.source is None:
         if table.frame is not None:
             raise SceneError('particles.frame: needs from = "FILE.h5"')

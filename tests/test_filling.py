@@ -298,3 +298,30 @@ def test_few_balls_have_the_bits_of_whole_batches(surfaces, monkeypatch):
     measured = filling._points(scene, filling._POINTS, np.random.default_rng(3))[1]()
     assert (volume, few.volume_error) == measured
     assert 0.0 <= measured.error < 1e-2 * volume
+
+
+@pytest.mark.parametrize("radius", [None, 0.02])
+def test_within_is_the_part_of_a_scene_in_which_particles_start(radius):
+    """A scene that is open too, and what the part has in common with its walls alone."""
+    floor = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0))], gravity=(0.0, 0.0, -9.81))
+    part = swarm.Box((0.2, 0.2, 0.2), center=(1.0, 0.0, 0.1))
+    particles = swarm.fill(floor, 200, speed=1.0, seed=1, radius=radius, within=part)
+    low, high = np.array([0.8, -0.2, 0.0]), np.array([1.2, 0.2, 0.3])
+    reach = radius or 0.0
+    assert (particles.position >= low[:, None] + reach - 1e-15).all()
+    assert (particles.position <= high[:, None] - reach + 1e-15).all()
+    # Four standard deviations of the mean of a uniform distribution.
+    means = np.abs(particles.position.mean(axis=1) - 0.5 * (low + high))
+    assert (means < 4 * (high - low) / np.sqrt(12 * 200)).all()
+    assert float(particles.volume) == pytest.approx(0.048, rel=0.01)
+    same = swarm.fill(swarm.Scene([*floor.surfaces, part]), 200, speed=1.0, seed=1, radius=radius)
+    np.testing.assert_array_equal(particles.position, same.position)
+
+
+def test_what_is_within_is_a_surface_and_no_wall():
+    for given, sentence in (
+        (0.5, "within must be a surface such as swarm.Plane, got 0.5"),
+        (swarm.Sphere(0.1, restitution=0.5), "within.restitution must be left out, it is no wall, got 0.5"),
+    ):
+        with pytest.raises(swarm.SceneError, match=sentence):
+            swarm.fill(SPHERE, 10, speed=1.0, within=given)

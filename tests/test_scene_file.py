@@ -362,6 +362,25 @@ def test_balls_from_a_file(tmp_path):
     assert particles.spin.T.tolist() == [[1.0, 2.0, 3.0]]
 
 
+WITHIN = 'within = { kind = "sphere", radius = 0.1, center = [0.2, 0.0, 0.0] }'
+
+
+def test_particles_start_in_a_part(tmp_path):
+    job = read(tmp_path, GOOD.replace("speed = 0.5", f"speed = 0.5\n{WITHIN}"))
+    start = swarm.fill(job.scene, 10, speed=0.5, within=swarm.Sphere(0.1, (0.2, 0.0, 0.0)))
+    np.testing.assert_array_equal(job.start().position, start.position)
+    for given, sentence in (
+        (f"count = 10\nspeed = 0.5\n{WITHIN.replace('sphere', 'ball')}", r"particles\.within\.kind must be .*'ball'"),
+        (
+            f"speed = 0.5\nfraction = 0.1\nradius = 0.1\n{WITHIN}",
+            r"\[particles\]: within must be left out with a fraction",
+        ),
+        (f'from = "start.csv"\n{WITHIN}', r"particles\.within: cannot be combined with from = 'start\.csv'"),
+    ):
+        with pytest.raises(swarm.SceneError, match=sentence):
+            read(tmp_path, GOOD.replace("count = 10\nspeed = 0.5", given)).start()
+
+
 def test_particles_from_files(tmp_path):
     csv = tmp_path / "start.csv"
     csv.write_text("x,y,z,vx,vy,vz,mass\n0.1,0,0,1,0,0,2\n")

@@ -385,11 +385,11 @@ OPEN = {
 
 @pytest.mark.parametrize("name", OPEN)
 def test_a_scene_is_not_reported_as_open_where_gravity_pulls_all_particles_back(name, caplog):
-    surfaces, gravity, is_said = OPEN[name]
+    surfaces, gravity, comes = OPEN[name]
     start = swarm.Particles((-0.1, 0.2, 0.3), (3.0, 0.1, 2.0))
     result = swarm.simulate(swarm.Scene(surfaces, gravity), start, swarm.Impact(), until=20.0, compile="never")
-    assert ("the scene is open" in caplog.text) == is_said
-    assert is_said or result.observables["escaped"][-1] == 0
+    assert ("the scene is open" in caplog.text) == comes
+    assert comes or result.observables["escaped"][-1] == 0
 
 
 def test_a_run_in_two_parts_is_the_run():

@@ -146,6 +146,7 @@ _OF_CLASS: dict[tuple[str, str], Form] = {
     ("Source", "density"): LENGTH,
     ("Source", "times"): listed(NUMBER, 1),
     ("ParticlesTable", "radius"): NUMBERS,
+    ("ParticlesTable", "within"): named("place"),
     ("Path", "times"): listed(NUMBER, 2),
     ("Absorb", "probability"): PART,
     ("Absorb", "loss"): PART,

@@ -5,6 +5,7 @@ import functools
 import itertools
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from ..errors import SceneError
 from ..particles import Particles, VolumeEstimate
 from ..scene import Scene
 from ..state import Floats
+from ..surfaces.counter import require_bare
+from ..surfaces.surface import Surface
 from .fitting_shapes import require_shapes
 from .sequential import VolumeBox, is_sparse, place_balls, require_packing, require_size
 
@@ -32,7 +35,7 @@ _SOME, _CERTAIN, _AT_ONCE = 1 << 15, 7.0, 1 << 14
 _INSTEAD = "the particles as arrays, a CSV file or a source with a volume"
 
 
-def fill(
+def fill(  # noqa: PLR0913  the keywords are the public interface
     scene: Scene,
     n: int,
     *,
@@ -42,6 +45,7 @@ def fill(
     seed: int = 0,
     exact: bool = False,
     radius: ArrayLike | None = None,
+    within: Surface | None = None,
 ) -> Particles:
     """N particles, uniform in the admissible volume, with isotropic or Maxwellian velocities.
 
@@ -60,12 +64,14 @@ def fill(
             sqrt(mass temperature/n): walls change it, and to take it out would leave fewer than 3 n degrees of freedom.
         radius: one number or (n,) [m], above 0: balls, at places where they overlap neither one another nor the walls,
             one after the other, the largest first; None: points, which do not meet one another.
+        within: a volume, a surface as an opening is: particles start in the part of the scene within it, and only that
+            part has to be bounded; balls are wholly in it. None: in all of the scene.
 
     Returns:
-        The particles; their `volume` is the admissible volume of points [m^3]; in a scene with a plane all of them are
-        in it, and it is the admissible area [m^2]. It is a closed form where the scene is one cavity that has one, or a
-        cell that repeats, less solids within that do not overlap; else it is estimated from the random points, and
-        `volume_error` is the standard error.
+        The particles; their `volume` is the admissible volume of points [m^3], of that part of it with `within`; in a
+        scene with a plane all of them are in it, and it is the admissible area [m^2]. It is a closed form where the
+        scene is one cavity that has one, or a cell that repeats, less solids within that do not overlap; else it is
+        estimated from the random points, and `volume_error` is the standard error.
 
     Raises:
         SceneError: an argument is out of its range, both or neither of speed and temperature are given, the
@@ -78,6 +84,9 @@ def fill(
     Particles(10)
     """
     checks.of_class("scene", scene, Scene)
+    if within is not None:
+        require_bare("within", within, "it is no wall")
+        scene = replace(scene, surfaces=(*scene.surfaces, within))
     n = checks.count("n", n)
     checks.particles_fit("n", n)
     seed = checks.count("seed", seed, least=0)

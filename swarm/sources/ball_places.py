@@ -19,7 +19,7 @@ _LOG = logging.getLogger("swarm")
 _BLOCK, _MOST_ROUNDS = 1024, 256
 # A ball that is born at a wall is so much of its radius away from it.
 _CLEAR = 1e-9
-# What to do, and what came, by the argument that can be changed: of balls, and of bodies, whose size is given.
+# What to do, and what came, by the argument that can be changed: of balls, and of bodies, which have a size.
 _MEND = {"radius": "use smaller balls, or a larger source", "where": "move it, or make it larger"}
 _LACKING = {
     "radius": "got {:g} m, for which none of {} random places is; ",

@@ -216,15 +216,15 @@ def test_a_source_without_a_radius_has_that_of_the_grains_at_the_start():
     assert refusal([0.007, 0.008], 0.012) == f"sources[0].mass {must} masses from 0.007 to 0.008 kg, got None"
 
 
-@pytest.mark.parametrize(("radius", "is_said"), [(0.02, False), (0.027, True)])
-def test_births_that_take_the_same_places_again_are_said_once(caplog, radius, is_said):
+@pytest.mark.parametrize(("radius", "comes"), [(0.02, False), (0.027, True)])
+def test_births_that_take_the_same_places_again_are_reported_once(caplog, radius, comes):
     scene = swarm.Scene([swarm.Box((0.03, 0.03, 0.03))])
     source = swarm.Source(0, volume=True, rate=4e5, even=True, speed=0.1, radius=radius, mass=0.007)
     swarm.simulate(scene, None, SOFT, sources=source, until=2e-3, compile="never", seed=2)
-    said = [message for message in caplog.messages if "random places" in message]
-    assert len(said) == is_said
+    warnings = [message for message in caplog.messages if "random places" in message]
+    assert len(warnings) == comes
     # A place is within the box of the centres with the probability 0.1^3.
-    assert not said or 262 - 65 < int(re.search(r"only (\d+) of 262144", said[0])[1]) < 262 + 65
+    assert not warnings or 262 - 65 < int(re.search(r"only (\d+) of 262144", warnings[0])[1]) < 262 + 65
 
 
 def test_arguments():
