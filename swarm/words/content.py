@@ -25,6 +25,7 @@ class Content:
         frames: the particles at the "start" and at the "end", as far as they are known.
         gone: of each frame a mask of the particles that had escaped or been absorbed by then.
         counters: the counters of the run, as far as a file keeps them.
+        births: when each particle came [s], NaN of those that did not, and from which source; None: not known.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Content:
     frames: dict[str, Particles]
     gone: dict[str, Gone] = field(default_factory=dict)
     counters: Sequence[Any] = ()
+    births: tuple[NDArray[Any], NDArray[Any]] | None = None
 
     def inside(self, name: str) -> Particles:
         """The particles of a frame; those that left the scene have positions of NaN."""
@@ -59,7 +61,14 @@ def content_of(trajectory: Any) -> Content:
         {name: trajectory.frame(k) for name, k in numbers.items()},
         {name: one for name, one in left.items() if one is not None},
         trajectory.counters,
+        births_of(trajectory),
     )
+
+
+def births_of(trajectory: Any) -> tuple[NDArray[Any], NDArray[Any]] | None:
+    """When each particle of a `Trajectory` came, and from which source, as far as it keeps them."""
+    known = trajectory.has_particles() and trajectory.has_births()
+    return (trajectory.birth_time, trajectory.birth_source) if known else None
 
 
 def content_of_result(result: Any, what: str) -> Content:
@@ -69,14 +78,15 @@ def content_of_result(result: Any, what: str) -> Content:
     body = None if result.bodies is None else result.bodies.body
     name, frames = "", {}
     counters: Sequence[Any] = ()
+    births = None
     if result.trajectory is not None and result.trajectory.is_file():
         from ..files.trajectory import load
 
         name = result.trajectory.name
         with load(result.trajectory) as written:
-            counters = written.counters
+            counters, births = written.counters, births_of(written)
             frames = {"start": written.frame(0)} if written.has_particles() else {}
     frames["end"] = result.particles
     left = {"end": gone_of((result.escape_time, result.absorbed_time))} if body is None else {}
     count, seen = len(result.particles), result.observables
-    return Content(name, result.scene, result.method, body, count, seen, frames, left, counters)
+    return Content(name, result.scene, result.method, body, count, seen, frames, left, counters, births)

@@ -109,6 +109,7 @@ def of_setting(content: Content, most: int | None = None) -> list[Statement]:
         Statement("what runs", _what_runs(content)),
         *_of_body(content.body),
         *_packing(content),
+        *of_sources(content),
         *of_surroundings(content.scene, most),
         *of_counters(content.counters, seen["crossings"][-1] if "crossings" in seen else ()),
         of_method(content.method),
@@ -132,10 +133,34 @@ def _what_runs(content: Content) -> str:
     ):
         if not len(values):
             continue
-        low, high = float(values.min()), float(values.max())
-        same = high - low <= 1e-9 * abs(high)
-        stated += f"{what} {amount(low, unit) if same else amounts([low, high], unit).replace(' and ', ' to ')}"
+        stated += f"{what} {_range(values, unit)}"
     return stated.replace(" radius of ", " radius and ")
+
+
+def _range(values: Any, unit: str) -> str:
+    """The least and the largest of some values, or the one that all have."""
+    low, high = float(values.min()), float(values.max())
+    same = high - low <= 1e-9 * abs(high)
+    return amount(low, unit) if same else amounts([low, high], unit).replace(" and ", " to ")
+
+
+def of_sources(content: Content) -> list[Statement]:
+    """How many particles each source gave, of which size and mass, and when; [] where a file does not keep these."""
+    end = content.frames.get("end")
+    if content.births is None or content.body is not None or end is None or len(end.mass) != content.count:
+        return []
+    stated, (times, sources) = [], content.births
+    for k in range(content.seen["born"].shape[1]):
+        came = np.flatnonzero((sources == k) & (times <= content.seen["time"][-1]))
+        text = _counted(len(came), "particle" if end.radius is None else "ball")
+        if len(came):
+            text += "" if end.radius is None else f" of {_range(end.radius[came], 'm')} radius"
+            first, last = float(times[came].min()), float(times[came].max())
+            text += f"{' of' if end.radius is None else ' and'} {_range(end.mass[came], 'kg')}"
+            text += f", from {amounts([first, last], 's').replace(' and ', ' to ')}" if last > first else ""
+            text += f", {plain(float(f'{(len(came) - 1) / (last - first):.3g}'))} a second" if last > first else ""
+        stated.append(Statement(f"source {k}", text))
+    return stated
 
 
 def _of_body(body: Body | None) -> list[Statement]:

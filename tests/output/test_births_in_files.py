@@ -122,6 +122,7 @@ def test_tables_and_arrays(path):
         assert dataset.born.dims == ("time", "source")
         statements = facts.of_trajectory(trajectory)
     assert statements["born"] == "source 0: 4"
+    assert statements["source 0"] == "4 particles of 1 kg, from 0.2 to 0.8 s, 5 a second"
     assert "4 of them from sources" in statements["particles"]
     found = numbers(path)
     assert found["born"] == [4]
