@@ -63,12 +63,14 @@ def colour_bar(
     packed: list[Colours] | None = None,
     values: Floats | None = None,
 ) -> None:
-    """A colour bar for the particles, below these axes; where all have one colour of it, 0xRRGGBBAA, words.
+    """A colour bar for the particles, below these axes; where all have one colour, 0xRRGGBBAA, words; none for none.
 
     The words are about the `values` of the particles, or, where these are not known, about those of the colour.
     """
     every = np.unique(np.concatenate(packed)) if packed else np.empty(0, np.uint32)
     there = every[every & 0xFF > 0]
+    if packed and not len(there):
+        return
     if len(there) == 1:
         caption = _colour_in_words(quantity, low, high, there) if values is None else _values_in_words(quantity, values)
         figure.supxlabel(caption, fontsize=8.5, color=INK)

@@ -168,15 +168,15 @@ def area(loop):
     return abs(0.5 * float((x * v - u * y).sum()))
 
 
-def test_where_all_have_one_speed_there_are_words_and_no_bar():
+def test_where_all_have_one_speed_there_are_words_and_no_bar_and_neither_where_none_is():
     with style.applied():
-        for colours, bars in (([RED, RED], 1), ([RED, 0x0000FFFF], 2)):
+        for colours, bars in (([RED, RED], 1), ([RED, 0x0000FFFF], 2), ([0, 0], 1)):
             figure = style.picture(4.0, 4.0)
             axes = figure.add_subplot()
             drawing.colour_bar(figure, axes, "speed [m/s]", 0.0, 2.0, [np.array(colours, np.uint32)])
             assert len(figure.axes) == bars
             words = figure._supxlabel.get_text() if figure._supxlabel else ""
-            assert words.startswith("all at a speed ") == (bars == 1)
+            assert words.startswith("all at a speed ") == (colours == [RED, RED])
 
 
 def words_below(quantity, low, high, values=None, shown=()):

@@ -39,7 +39,7 @@ def content(scene, method=None, count=1000, body=None, radius=None, until=1.0, *
     frame = swarm.Particles(np.zeros((3, 2)), np.ones((3, 2)) * 1e-3, 1e-4, radius=radius)
     seen = {"time": np.array([0.0, until]), **{name: np.asarray(values) for name, values in seen.items()}}
     given = {"scene": scene, "method": method or swarm.Impact(), "count": count, "body": body, "seen": seen}
-    return types.SimpleNamespace(name="", frames={"start": frame, "end": frame}, counters=(), **given)
+    return types.SimpleNamespace(name="", frames={"start": frame, "end": frame}, counters=(), births=None, **given)
 
 
 def every_text(run):
