@@ -17,7 +17,7 @@ from ..kernel.vector import column, put
 from ..surfaces.facets.facet_cells import BLOCK, blocks_of, flight_in, from_middle, passes
 from ..surfaces.facets.free_room import NormalCone, cone_of, room_of
 from ..surfaces.facets.members import hit_of
-from .table import STRIDE, marked_lanes
+from .table import STRIDE, marked_lanes, whole_eights
 
 # The hit of a lane, in rows of `course`.
 _TIME, _WALL = 0, 1
@@ -103,6 +103,13 @@ class UnderWay(Record):
             self.rows[k, target] = self.rows[k, source]
         self.time[target], self.owner[target] = self.time[source], self.owner[source]
         self.last[target] = self.last[source]
+
+    def in_eights(self, n):
+        """So many in whole vectors: the last lane is there again, as one alone takes as long as eight."""
+        count = whole_eights(n)
+        for i in range(index(n), count):
+            self.move(index(n - 1), i)
+        return count
 
     def take(self, i, met):
         """Take a `Hit` of a lane, or without a wall how far it surely meets none, if it is the first on its way."""
@@ -248,7 +255,7 @@ def go_from_cell_to_cell(under, gravity, mesh, before, lanes, live):
         under.begin(i, lanes.lane(i), course[_TIME, i])
     n = int(live)
     for _step in range(_MOST):
-        _find_cells(gravity, mesh, under, lanes, n)
+        _find_cells(gravity, mesh, under, lanes, under.in_eights(n))
         _look(gravity, mesh, under, (looks, maybe), lanes.order, marked_lanes(lanes, n))
         n = under.go_on(gravity, mesh, before, course, n)
         if n == 0:

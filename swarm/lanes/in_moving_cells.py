@@ -24,7 +24,7 @@ from ..surfaces.time_of_impact.march import lets_go
 from ..surfaces.time_of_impact.rising import InWallFrame, Level, ThirdDerivativeBound, flight_of
 from ..surfaces.time_of_impact.safe import CURVED
 from .from_cell_to_cell import MIDDLE, ROWS, SPEED, START, UnderWay, go_from_cell_to_cell, under_way
-from .table import EIGHT, LANES, STRIDE
+from .table import LANES, STRIDE, whole_eights
 
 # More rows of a lane that is under way: of its flight at its start, and of where it is in the frame of the mesh.
 _REMAINING, _FAST = SPEED + 3, SPEED + 4
@@ -156,7 +156,10 @@ def go_through_moving(gravity, mesh, before, lanes, live):
 def _meet(gravity, mesh, under, maybe, first, count):
     """Take the hits with so many facets: those that a flight does not surely miss, by safe steps side by side."""
     marked, near = unwritten(STRIDE, np.bool_), near_facets()
-    for n in range(index(count)):
+    last = first + index(count - 1)
+    for n in range(index(count), whole_eights(count)):
+        maybe.lane[first + n], maybe.facet[first + n] = maybe.lane[last], maybe.facet[last]
+    for n in range(whole_eights(count)):
         i, facet = index(maybe.lane[first + n]), member(mesh.body, index(maybe.facet[first + n]))
         way = facet.way_past(under.seen(mesh, gravity, i), under.until[i] - under.time[i])
         marked[n], near.step[n] = not way.misses, way.begin
@@ -200,7 +203,7 @@ class NearFacets(Record):
 
     def in_eights(self, left):
         """So many in whole vectors: the last one is there again, as one alone takes as long as eight."""
-        count = index((left + index(EIGHT - 1)) // EIGHT * EIGHT)
+        count = whole_eights(left)
         for k in range(left, count):
             self.lane[k], self.facet[k], self.time[k] = self.lane[left - 1], self.facet[left - 1], self.time[left - 1]
         return count
@@ -270,7 +273,7 @@ def _approach(facet, seen, t, until):
     ahead = 2.0 * rise_time(depth, rate, bend)
     ahead = select(ahead < longest, ahead, longest)
     jerk, speed = seen.jerk(ahead), seen.bounds(ahead).speed
-    third, rest = (1.0 / 6.0) * jerk.along(facet.normal), (1.0 / 6.0) * jerk.rest
+    third, rest = (1.0 / 6.0) * jerk.along(facet.normal), (1.0 / 6.0) * jerk.off
     time = rise_time(depth, rate, bend + (positive(third) + rest) * ahead)
     time = select(time < ahead, time, ahead)
     is_sure = 2.0 * (abs(third) + rest) * ahead * time * time <= room

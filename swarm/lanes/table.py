@@ -100,6 +100,11 @@ def copy_lane(source, i, target, k, count):
         target[row, k] = source[row, i]
 
 
+def whole_eights(n):
+    """The least number of whole vectors, in lanes, that so many lanes fit in."""
+    return index((index(n) + index(EIGHT - 1)) // EIGHT * EIGHT)
+
+
 def marked_lanes(lanes, live):
     """The number of marked lanes; which they are is in `order`.
 

@@ -173,7 +173,8 @@ def test_no_facet_that_a_curve_meets_is_passed_over(jerks):
             v, a, j = random.standard_normal((3, 3)) * [[1.0], [random.choice([0.1, 1.0, 10.0])], [jerks]]
             span = random.choice([0.1, 0.5, 1.0]) * width.max()
             known = random.integers(3)
-            jerk = Jerk(vec(0.5 * known * j) if known else None, (1.0 - 0.5 * known) * np.linalg.norm(j))
+            rest = (1.0 - 0.5 * known) * np.linalg.norm(j)
+            jerk = Jerk(vec(0.5 * known * j) if known else None, rest, rest)
             cell = cell_of(cells, vec(r))
             here = flight_in(cells, from_middle(cells, cell.place, vec(r)), vec(v), vec(a), span, jerk)
             first, stop = entries_of(cells, number)

@@ -193,7 +193,7 @@ class FacetNumbers(Flat):
         """
         c, b, a = self.phi(seen.r), 0.5 * dot(self.normal, seen.v), 0.5 * dot(self.normal, seen.a)
         jerk, room, sixth = seen.jerk(longest), self.room.value, longest * (1.0 / 6.0)
-        along, off = jerk.along(self.normal), sixth * jerk.rest
+        along, off = jerk.along(self.normal), sixth * jerk.off
         more, less = sixth * positive(along) + off, sixth * positive(-along) + off
         begin, end = rise_time(c, b, a + more), rise_time(c - room, b, a - less)
         stays = (a >= less) | (c - room + longest * (2.0 * b + longest * (a - less)) > 0.0)

@@ -25,7 +25,7 @@ from .free_room import rows_of, spare_of
 # Of the width of a cell the square is so many times the mean area of a facet: a wider one has more facets, of finer
 # ones more are crossed. It doubles with ten times as many facets, from the first number of facets to the second: what
 # the processor's cache holds is crossed sooner. For each facet there are at most so many cells, of 5 bytes each.
-_AREA, _DOUBLES, _FEW, _MANY = 1.5, math.log10(2.0), 1e3, 1e5
+_AREA, _DOUBLES, _FEW, _MANY = 1.0, math.log10(2.0), 260.0, 1e5
 _CELLS_EACH, _MOST_CELLS = 32.0, 100_000_000
 # Cells of few facets.
 _LEAST_CELLS = 64
@@ -244,8 +244,7 @@ def flight_in(cells, at, v, pull, span, jerk=None):
         bent = (0.5 * unit * span * span) * as_vector(pull)
     if jerk is not None:
         sixth = unit * span * span * span * (1.0 / 6.0)
-        off = sixth * jerk.rest
-        bends = 3.0 * off
+        off, bends = sixth * jerk.off, 3.0 * sixth * jerk.rest
         if jerk.known is not None:
             # s^3 = (3 s^2 - s)/2 + s (s - 1/2) (s - 1), of which the last is little, and so are its derivatives.
             cubic = sixth * jerk.known

@@ -67,6 +67,7 @@ class Jerk(Record):
 
     known: Any  # what is known of it, or None
     rest: float  # a bound of what it may be beside that
+    off: float  # after a time t the place is beside the cubic by off t^3/6 at most
 
     def along(self, normal):
         """What is known of it along a normal."""
@@ -111,14 +112,16 @@ class InWallFrame(Record):
         """Its `Jerk` for so long [s]."""
         drive, turn = self.drive, self.drive.turn
         if turn is None:
-            return Jerk(None, drive.jerk)
+            return Jerk(None, drive.jerk, drive.jerk)
         # Of x = r - c - d with the derivatives x1, x2, x3 it is A^T (x3 - 3 w x x2 + 3 w x (w x x1) + w^2 w x x).
         # All but the first is known now, and changes as A^T turns by the rate once more.
         spin, spins = abs(turn.rate), turn.rate * turn.axis
         known = cross(spins, spin * spin * (self.r - drive.center) - 3.0 * (self.a + cross(spins, self.v)))
         speed = self.fastest(within)
         fourth = 6.0 * self.hardest() + spin * (4.0 * speed + spin * (self.arm + speed * within))
-        return Jerk(known, drive.jerk + within * spin * (3.0 * drive.jerk + spin * fourth))
+        grows = within * spin * (3.0 * drive.jerk + spin * fourth)
+        # What grows as k t moves a place by k t^4/24.
+        return Jerk(known, drive.jerk + grows, drive.jerk + 0.25 * grows)
 
     def place(self, t, jerk):
         """Its place after a time, but for the rest of its `Jerk`."""
@@ -129,8 +132,8 @@ class InWallFrame(Record):
         """The `MostPull` along each axis that bounds its places for so long [s]."""
         most, jerk = self.bounds(within).acceleration, self.jerk(within)
         x, y, z = (0.0, 0.0, 0.0) if jerk.known is None else jerk.known
-        ahead = Vec(*(jerk.rest + positive(along) for along in (x, y, z)))
-        back = Vec(*(jerk.rest + positive(-along) for along in (x, y, z)))
+        ahead = Vec(*(jerk.off + positive(along) for along in (x, y, z)))
+        back = Vec(*(jerk.off + positive(-along) for along in (x, y, z)))
         # x <= v t + a t^2/2 + J t^3/6
         return tuple(
             MostPull(min(a + up * within * (1.0 / 3.0), most), min(down * within * (1.0 / 3.0) - a, most))
@@ -431,7 +434,7 @@ def plane_step(level, n, seen, longest):
     ahead = 2.0 * rise_time(level, half, bend)
     ahead = select(ahead < longest, ahead, longest)
     jerk = seen.jerk(ahead)
-    sixth = (1.0 / 6.0) * (positive(jerk.along(n)) + jerk.rest)
+    sixth = (1.0 / 6.0) * (positive(jerk.along(n)) + jerk.off)
     time = rise_time(level, half, bend + sixth * ahead)
     return LevelStep(level, half, select(time < ahead, time, ahead))
 
