@@ -48,6 +48,11 @@ def has_limit(surface, law, r):
     return (impulse.start_of(0.0, surface, r).gap == 0.0) & (law.constraint_gradient(0.0) > 0.0)
 
 
+def stored(surface, law, r):
+    """V at r, where a step starts."""
+    return law.stored_energy(impulse.start_of(0.0, surface, r).gap)
+
+
 def multiplier_of(surface, law, r, c, kappa):
     """lambda from (K) with g0 = g1 = 0, kappa = c lambda Phi'(0) g'(q0); 0 away from the wall."""
     start = impulse.start_of(0.0, surface, r)

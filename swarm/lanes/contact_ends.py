@@ -91,7 +91,7 @@ def _end(method, walls, gravity, share, lanes, i, step):
     n, u = now.unit_normal(wall, r), wall_velocity(method.moving, now, wall, r)
     away, pressed = -dot(relative(u, v), n), state.pressed[row, p]
     b = max(away, 0.0)
-    if now.distance(wall, flier.r) > 0.0 and not (method.multiplies and away > 0.0):
+    if now.distance(wall, flier.r) > 0.0 and (away <= 0.0 or method.lasts_outside(now, wall, flier.r)):
         if away <= _STOPPED * norm(before) and dot(relative(u, before), n) < 0.0:
             # In a contact that a weight makes last, friction acts each time that the particle turns back, and where
             # friction at another wall stops it.

@@ -313,6 +313,10 @@ class Steps(contract.MethodNumbers):
         """The work of a force of this wall in a step with these walls and ends, r0 and r1; 0 where no wall moves."""
         return 0.0 if self.moving is None else dot(force, over.swept(wall, *ends))
 
+    def lasts_outside(self, walls, wall, r):
+        """Whether the contact of a particle that leaves its wall, outside of it at r, goes on in the next step."""
+        return True
+
     def flight(self: Any, walls, gravity, lane, hit=None):
         """Over the steps that surely stay free, to one that touches a wall: HARD where a lane cannot take it alone."""
         dt, left = self.dt, lane.remaining * self.dt

@@ -207,6 +207,10 @@ class FixedSteps(StepNumbers):
     def is_alone(self, met, after, start, r1, kappa):
         return not after.outside(met[1], r1)
 
+    def lasts_outside(self, walls, wall, r):
+        # From where a loop that has not converged has left it, the next step pushes it again.
+        return walls.of(wall, 0.0, uzawa.stored, self.law, r) > self.tolerance
+
     @outlined
     def as_impacts(self, walls, lane, cut, wall, lanes, i):
         if self.moving is not None:
@@ -246,6 +250,9 @@ class CutSteps(StepNumbers):
 
     def is_new(self, walls, r):
         return True
+
+    def lasts_outside(self, walls, wall, r):
+        return False
 
     def held(self, walls, start, wall):
         # Of a field the member that is met: its row is the number of that. Of a union the room.

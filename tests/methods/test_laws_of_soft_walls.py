@@ -140,6 +140,22 @@ def test_what_friction_stops_in_an_edge_ends_its_contact_at_both_faces(tmp_path)
         assert (np.bincount(log.table()["particle"], minlength=n) == 2).all()
 
 
+@pytest.mark.parametrize("drift", [0.0, 0.25])
+def test_a_contact_that_a_loop_leaves_outside_ends_a_step_later(tmp_path, drift):
+    """That step pushes the particle once more: the row has this impulse too, and friction is Coulomb's with it."""
+    motion = None if drift == 0.0 else swarm.Translation((0.0, 0.0, -drift))
+    scene = swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 0.0, motion=motion, friction=0.3)], gravity=None)
+    method = swarm.AugmentedLagrangian(**(LOOP | {"on_unconverged": "count"}), acceleration="reflection")
+    start = swarm.Particles((0.0, 0.0, 0.047), (0.6, 0.0, -0.5 - drift))
+    seen = ran(scene, start, method, impacts=tmp_path / "log.h5").observables
+    assert seen["unconverged"][-1] > 0
+    with swarm.load_impacts(tmp_path / "log.h5") as log:
+        rows = log.table()
+    assert rows["impulse"] == pytest.approx([seen["impulse"][-1, 0]], rel=1e-12)
+    rubbed = (rows["velocity_before"] - rows["velocity_after"])[0, 0]
+    assert rubbed == pytest.approx(0.3 * rows["impulse"][0], rel=1e-12)
+
+
 @pytest.mark.parametrize("law", ["plain", "both", "hot"])
 @pytest.mark.parametrize("name", ["Penalty", "cut", "fixed"])
 def test_the_log_has_a_row_where_a_contact_ends(tmp_path, name, law):
