@@ -17,7 +17,7 @@ from ...kernel.jit import outlined
 from ...kernel.limits import ENERGY_OF_IMPACT
 from ...kernel.vector import column, dot, norm, square
 from .contacts import MOST_CONTACTS, direction, put_direction, put_frame, sweep
-from .impact import SHORT, SWEEPS, body_impact
+from .impact import SHORT, SWEEPS, body_impact, kinetic_of
 
 
 def is_short(bodies, i):
@@ -59,6 +59,7 @@ def stop(bodies, state, i):
     number, found = bodies.pace.body[i], bodies.pace.active[i]
     if not (_sticks(bodies, i) or (is_short(bodies, i) and touching.dissipate(active.name[i], found))):
         return
+    state.dissipated[number] += _over_round_off(bodies, i)
     m, wide = ties.links + touching.guides, touching.width(active.name[i], found)
     rows = wide * found
     name, frame = scratch((MOST_CONTACTS, 2), np.int64), scratch((MOST_CONTACTS, 3, 3), np.float64)
@@ -84,6 +85,26 @@ def stop(bodies, state, i):
     lost = blow.taken(lost, rate, change)
     state.dissipated[number] += lost
     state.work[number] += blow.push(state, change, against, lost, i)
+
+
+def _over_round_off(bodies, i):
+    """The energy that forces have taken over the round-off of places in a step; over more it is an error.
+
+    A short step that stops a contact has large ones: 10^5 N for a die that weighs 0.05 N, in 5e-12 s.
+    """
+    ties, lanes, pace, active = bodies.ties, bodies.lanes, bodies.pace, bodies.active
+    if bodies.rule.stages.size > 1 or ties.links < ties.ends.shape[0] or max(ties.led) >= 0:
+        return 0.0
+    lost, most = pace.work[i] - active.lost[i] + kinetic_of(ties, lanes.va, i) - kinetic_of(ties, lanes.v, i), 0.0
+    for p in range(ties.mass.shape[0]):
+        mass = 0.0
+        for q in range(ties.mass.shape[0]):
+            mass += ties.mass[p, q]
+        for x in range(3):
+            lost += mass * bodies.rule.gravity[x] * (lanes.r[3 * p + x, i] - lanes.ra[3 * p + x, i])
+    for a in range(pace.active[i]):
+        most += active.press[i, 3 * a] * bodies.rule.room
+    return lost if abs(lost) <= most else 0.0
 
 
 def _sticks(bodies, i):
