@@ -140,7 +140,7 @@ def test_an_open_volume_is_refused(surface):
 def test_a_formula_of_the_other_sign_is_named():
     with pytest.raises(swarm.SceneError, match=r"is a cavity as \"-\(0\.2 - x\*\*2 - y\*\*2 - z\*\*2\)\" with side"):
         swarm.fill(swarm.Scene([swarm.Formula("0.2 - x**2 - y**2 - z**2")]), 10, speed=1.0)
-    with pytest.raises(swarm.SceneError, match=r"arrays or a CSV file$"):
+    with pytest.raises(swarm.SceneError, match=r"arrays, a CSV file or a source with a volume$"):
         swarm.fill(swarm.Scene([swarm.Formula("x**2 + y**2 - 0.2")]), 10, speed=1.0)
 
 

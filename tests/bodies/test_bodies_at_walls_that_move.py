@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from energy_books import unbooked
 
 import swarm
 from swarm.bodies.lanes import advance, impact_time
@@ -35,7 +36,9 @@ def require_balance(result):
     """What walls have done is what the bodies have gained, and lost."""
     seen = result.observables
     assert seen["energy_error"].max() < 1e-12
-    assert drift(seen) < 1e-12
+    # A slow die has 3e-5 of its energy of gravity as kinetic energy: the last digit of the one is 4e-12 of the other.
+    round_off = 2.0 * np.spacing(np.abs(seen["total_energy"]).max())
+    assert drift(seen) < 1e-12 or unbooked(seen) <= round_off
     assert seen["link_error"].max() < 1e-12
     assert seen["max_penetration"].max() < 1e-12
 
