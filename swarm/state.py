@@ -164,7 +164,8 @@ class State(NamedTuple):
     late: Floats | None = None  # (N,) what is left of the frame, in the method's unit, of those that start within it
 
     # Where contacts take time, and laws of walls act at their ends:
-    pressed: Floats | None = None  # (walls, N) the impulse of each contact so far, per mass [m/s]
+    pressed: Floats | None = None  # (walls, N) the impulse of each contact since friction last acted, per mass [m/s]
+    rubbed: Floats | None = None  # (walls, N) what it has had before that, in the same contact, per mass [m/s]
 
     @property
     def absorbed(self) -> Any:

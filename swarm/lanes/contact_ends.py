@@ -95,13 +95,15 @@ def _end(method, walls, gravity, share, lanes, i, step):
         if away <= _STOPPED * norm(before) and dot(relative(u, before), n) < 0.0:
             # In a contact that a weight makes last, friction acts each time that the particle turns back, and where
             # friction at another wall stops it.
+            state.rubbed[row, p] += pressed
             state.pressed[row, p] = 0.0
             _drag(method, walls, share, lanes, i, (wall, n, u, pressed))
         return
-    state.pressed[row, p] = 0.0
+    whole = state.rubbed[row, p] + pressed
+    state.pressed[row, p] = state.rubbed[row, p] = 0.0
     # An impulse that has not reversed the particle is the rest of a contact that has ended.
-    if pressed >= _REVERSED * b:
-        _act(method, walls, now, gravity, share, lanes, i, (wall, r, n, u, b, pressed))
+    if whole >= _REVERSED * b:
+        _act(method, walls, now, gravity, share, lanes, i, (wall, r, n, u, b, pressed, whole))
 
 
 def _drag(method, walls, share, lanes, i, at):
@@ -122,14 +124,17 @@ def _drag(method, walls, share, lanes, i, at):
 
 
 def _act(method, walls, now, gravity, share, lanes, i, at):
-    """Apply the laws of a wall where a contact ends: `at` is (wall, place, normal, velocity, speed away, impulse)."""
-    wall, r, n, _u, b, pressed = at
+    """Apply the laws of a wall where a contact ends.
+
+    `at` is (wall, place, normal, velocity, speed away, impulse since friction last acted, impulse).
+    """
+    wall, r, n, _u, b, _pressed, impulse = at
     flier, p, laws = lanes.lane(i), index(lanes.particle[i]), method.laws_at_ends
-    mass, impulse = share.state.mass[p], pressed
+    mass = share.state.mass[p]
     # As it would arrive at a rigid wall
     before = flier.v + 2.0 * b * n
     if laws.loses or laws.send_off:
-        impulse = pressed + _send(method, walls, now, gravity, share, lanes, i, at) - 2.0 * b
+        impulse += _send(method, walls, now, gravity, share, lanes, i, at) - 2.0 * b
     if share.log is not None:
         time = share.moment - method.seconds(flier.remaining)
         struck = Struck(lanes.particle[i], wall, time, r, before, flier.v, impulse * mass)
@@ -138,7 +143,7 @@ def _act(method, walls, now, gravity, share, lanes, i, at):
 
 def _send(method, walls, now, gravity, share, lanes, i, at):
     """Let the laws act: the impulse per mass of a rigid wall."""
-    wall, r, n, u, b, pressed = at
+    wall, r, n, u, b, pressed, _impulse = at
     state, flier, p, laws = share.state, lanes.lane(i), index(lanes.particle[i]), method.laws_at_ends
     v, mass = flier.v, state.mass[p]
     before = v + 2.0 * b * n

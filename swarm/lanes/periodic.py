@@ -110,12 +110,13 @@ def _return_stepped(method, walls, share, lanes, i):
 def _hand_on(period, walls, state, p, r, back):
     """The impulse of each contact that goes on with another image of its wall to that."""
     for k in range(walls.length()):
-        if state.pressed[k, p] == 0.0:
+        if state.pressed[k, p] + state.rubbed[k, p] == 0.0:
             continue
         for j in range(walls.length()):
             if j != k and _is_image(period, walls, (float(k), r), (float(j), back)):
                 state.pressed[j, p] += state.pressed[k, p]
-                state.pressed[k, p] = 0.0
+                state.rubbed[j, p] += state.rubbed[k, p]
+                state.pressed[k, p] = state.rubbed[k, p] = 0.0
                 break
 
 

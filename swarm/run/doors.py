@@ -60,8 +60,9 @@ class DoorRun(Run):
     def _lose(self, lost: NDArray[np.float64]) -> None:
         """Take energies from the particles, per mass [J/kg], which were stored with walls that went."""
         self.state.energy[:] -= lost
-        if self.state.pressed is not None:
-            self.state.pressed[np.ix_(self._left, lost > 0.0)] = 0.0
+        for impulse in (self.state.pressed, self.state.rubbed):
+            if impulse is not None:
+                impulse[np.ix_(self._left, lost > 0.0)] = 0.0
         self.state.dissipated[:] += lost * self.state.mass
 
     # --- At an instant -----------------------------------------------------------------------------------

@@ -65,6 +65,7 @@ def state_of(
         **none_left(n, openings is not None, ends),
         late=np.zeros(n) if (particles.births is not None or ends) and not method.may_slide() else None,
         pressed=np.zeros((rows, n)) if presses else None,
+        rubbed=np.zeros((rows, n)) if presses else None,
     )
 
 

@@ -194,3 +194,23 @@ def test_a_run_in_many_sessions_has_the_same_bits(tmp_path, monkeypatch):
     parts, ended = in_sessions(monkeypatch, DoorRun, 8, go)
     assert ended > 4
     require_same(parts, whole)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("degrees", [30.0, 60.0, 90.0, 120.0])
+def test_a_contact_that_the_other_face_of_an_edge_prolongs_is_one(tmp_path, degrees, friction):
+    """On its way out of one face the other pushes the particle into it again: the row has the impulse of both ways."""
+    sine, cosine = math.sin(math.radians(degrees / 2.0)), math.cos(math.radians(degrees / 2.0))
+    n = np.array([[-sine, 0.0, cosine], [-sine, 0.0, -cosine]])
+    walls = [swarm.Plane(tuple(one), 0.0, restitution=0.5, friction=friction) for one in n]
+    height = np.array([0.06, 0.17, 0.6]) * 0.1 * sine / cosine
+    rest = np.zeros(height.size)
+    start = swarm.Particles(np.array([rest + 0.1, rest, height]), np.array([rest - 1.0, rest + 0.3, rest]))
+    method = swarm.Penalty(1e-3, ALPHA)
+    seen = ran(swarm.Scene(walls, gravity=None), start, method, 1.0, impacts=tmp_path / "log.h5").observables
+    with swarm.load_impacts(tmp_path / "log.h5") as log:
+        rows = log.table()
+    assert np.bincount(rows["surface"], rows["impulse"]) == pytest.approx(seen["impulse"][-1], rel=1e-12)
+    before, after = (np.sum(rows[f"velocity_{way}"] * n[rows["surface"]], 1) for way in ("before", "after"))
+    assert after == pytest.approx(-0.5 * before, abs=1e-12)
+    assert balanced(seen) < 1e-13
