@@ -520,7 +520,6 @@ def one_more(x):
     return x + 1.0
 
 
-@compiled_only
 def test_every_kernel_that_a_run_compiles_has_a_name_in_words():
     """What `calls` of the engines yield is named on the terminal while it is compiled."""
     named = set()
@@ -534,6 +533,7 @@ def test_every_kernel_that_a_run_compiles_has_a_name_in_words():
     assert {name for name in named if compiling.sentence_of(SimpleNamespace(__name__=name)).split()[3] != "of"} == set()
 
 
+@compiled_only
 def test_compilations_are_reported_and_cached_kernels_are_not(tmp_path, monkeypatch, caplog):
     monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     sentences = []
