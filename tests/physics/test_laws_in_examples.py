@@ -25,7 +25,7 @@ def test_a_gas_in_a_ball_is_stored_by_its_closed_form(thermal):
     require_near(curve)
     tau = curve.time
     exact = (1.0 + 0.5 * tau**2) * erfcx(0.5 * tau) - tau / math.sqrt(math.pi) if thermal else np.exp(-tau)
-    assert curve.law == pytest.approx(exact, rel=1e-6)
+    assert curve.law == pytest.approx(exact, rel=1e-9)
     if thermal:
         slope = math.log(curve.law[-1] / curve.law[-2]) / math.log(tau[-1] / tau[-2])
         assert slope == pytest.approx(-3.0, abs=0.01)

@@ -153,10 +153,10 @@ def cup(laws):
 )  # fmt: skip
 def test_the_same_bits_compiled_in_plain_python_and_in_any_threads(name, laws, gravity):
     walls = cup(laws) if name == "cup" else WALLS[name](laws=laws)
-    one, two = (run(walls, gravity, 1.0, compile="always", threads=threads) for threads in (1, 2))
+    one, two = (run(walls, gravity, 2.0, compile="always", threads=threads) for threads in (1, 2))
     assert one.observables["impacts"][-1] > 50
     require_same(one, two)
-    few, plain = (run(walls, gravity, 1.0, n=3, compile=tier) for tier in ("always", "never"))
+    few, plain = (run(walls, gravity, 2.0, n=3, compile=tier) for tier in ("always", "never"))
     assert few.observables["impacts"][-1] > 3
     require_same(few, plain)
 
