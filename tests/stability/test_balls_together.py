@@ -24,8 +24,10 @@ from swarm.events.colliding import events
 
 UNTIL, FRAMES, NUMBER = 1.0, 8, 7
 REFUSED = []
-# Events of one run in plain Python; most take some hundred.
-EVENTS = 20_000
+# The contact durations of pairs that scenes draw [s].
+SHORT, LONG = 1e-4, 1e-2
+# Most runs take some hundred events. A ball that rests on a wall takes one in each contact duration.
+EVENTS = NUMBER * round(UNTIL / SHORT)
 SEEDS = range(24)
 # What 1e-9 m at the start grows to by a time, an error of round-off grows to in proportion.
 NUDGE, SPARE, LEAST = 1e-9, 1e-4, 1e-13
@@ -100,7 +102,7 @@ def a_scene(seed):
             motion = a_motion(random) if moves and not flat and random.random() < 0.7 else None
             surfaces += make(motion=motion, **law)
     pairs = swarm.Pairs(
-        restitution=float(random.choice([1.0, 1.0, 0.9, 0.6])), contact_duration=float(random.choice([1e-4, 1e-2]))
+        restitution=float(random.choice([1.0, 1.0, 0.9, 0.6])), contact_duration=float(random.choice([SHORT, LONG]))
     )
     scene = swarm.Scene(surfaces, gravity, period, "z" if flat else None, pairs)
     sizes = [(0.08,), (0.05, 0.1), (0.02, 0.06, 0.15)][random.integers(3)]
