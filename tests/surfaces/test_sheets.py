@@ -1,6 +1,7 @@
 """Sheets: triangles that are walls from both sides: impacts as at planes, none through, slides to the rim."""
 
 import math
+from dataclasses import replace
 
 import mpmath
 import numpy as np
@@ -116,6 +117,24 @@ def test_a_file_that_is_not_watertight(tmp_path):
     assert again.open
     assert np.array_equal(again.triangles, sheet.triangles)
     assert "open" not in tables.table_of(swarm.Mesh(np.array(BOX.vertices), np.array(BOX.faces)))
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.7])
+def test_triangles_in_one_plane_are_sheets(tilt):
+    """They enclose nothing, so they are no closed mesh that is damaged; a bent sheet may be one."""
+    given = plate(tilt)
+    for side in ("inside", "outside"):
+        mesh = swarm.Mesh(np.array(given.vertices), np.array(given.triangles), side)
+        assert mesh.open
+        assert tables.table_of(mesh) == tables.table_of(given)
+        assert replace(mesh, restitution=0.5).open
+    bent = np.array(given.vertices) + np.array([[0.0], [0.0], [0.0], [1e-3]])
+    with pytest.raises(swarm.SceneError, match="open=True"):
+        swarm.Mesh(bent, given.triangles)
+    with pytest.raises(swarm.SceneError, match="motion must be None"):
+        swarm.Mesh(np.array(given.vertices), np.array(given.triangles), motion=swarm.Translation((1.0, 0.0, 0.0)))
+    with pytest.raises(swarm.SceneError, match="triangles"):
+        swarm.Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
 
 
 def test_a_triangle_is_one_whichever_way_it_is_turned():

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ...state import Floats, Indices
+from .mending import sizes
 
 # Digits to which triangles are in one plane, of a normal and of an offset in sizes of the mesh.
 DIGITS = 9
@@ -34,6 +35,15 @@ def keys_of(planes: Floats, size: float) -> Floats:
 def in_plane(corners: Floats, plane: Floats) -> Floats:
     """Whether vertices (V, 3) are in a plane, a row as those of `planes_of`."""
     return np.asarray(np.abs(corners @ plane[:3] - plane[3]) <= 10.0**-DIGITS * np.abs(corners).max())
+
+
+def all_in_a_plane(corners: Floats, triangles: Indices) -> bool:
+    """Whether all triangles (T, 3) are in one plane."""
+    areas, _longest = sizes(corners, triangles)
+    if not areas.max(initial=0.0) > 0.0:
+        return False
+    (plane,) = planes_of(corners, triangles[[np.argmax(areas)]])
+    return bool(in_plane(corners, plane)[triangles].all())
 
 
 def rim_of(corners: Floats, triangles: Indices, plane: Floats, count: int) -> Floats:

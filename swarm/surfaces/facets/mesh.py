@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,7 +28,7 @@ from ..surface import UNBOUNDED, Box, Surface, side_sign
 from .faces import faces_of
 from .facet import OVERLAP, ROOM, THIN, CornersOf, CornersOfSides, FacetNumbers, Shared, SheetSide
 from .facet_cells import MOVING_MARGIN, cells_around
-from .flat import in_plane, places_of, planes_of, rim_of
+from .flat import all_in_a_plane, in_plane, places_of, planes_of, rim_of
 from .made import given_arrays, sorted_by_place, table_of_facets, table_of_sides, triangles_of_balls, with_room
 from .members import Facets
 from .mending import sizes
@@ -39,17 +39,6 @@ from .triangles import closed, sheets
 _NOUNS_OF_SHEETS = ("open mesh",) * 4
 # What a group may have of its own.
 _LAWS = ("restitution", "friction", "temperature", "accommodation", "laws")
-
-
-class _Made(NamedTuple):
-    """What is made of the triangles, also for a copy with other laws: where they are, and in which order."""
-
-    given: tuple[Any, ...]
-    vertices: Floats
-    triangles: Indices
-    group: Indices
-    names: tuple[str, ...]
-    weld: Magnitude
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -67,8 +56,9 @@ class Mesh(Surface):
         triangles: None with a path, else (T, 3) the numbers of their corners. They must enclose a volume, if not
             `open`; a part within an odd number of others is a cavity, whichever way its triangles are turned.
         side: "inside" or "outside" of the mesh, the admissible part; of sheets it is "outside", both sides of them.
-        open: whether the triangles are sheets. Their sides are 3e-11 of the farthest coordinate from them, which tells
-            on which one a point that touches a sheet is; balls touch the triangles themselves.
+        open: whether the triangles are sheets; those that all lie in one plane always are. Their sides are 3e-11 of
+            the farthest coordinate from them, which tells on which one a point that touches a sheet is; balls touch
+            the triangles themselves.
         center: where the origin of the file is, three numbers [m].
         scale: what a unit of the file is in metres, 0.001 for millimetres.
         weld: corners of open edges this near [m] are one, so that seams close; 0: none are. None: 1e-5 of the diagonal
@@ -109,10 +99,14 @@ class Mesh(Surface):
     names: Any = field(default=(), kw_only=True)
     mesh_weld: Magnitude | None = field(default=None, kw_only=True)
     open: Flag = field(default=False, kw_only=True, metadata={"younger": True})
-    _made: Any = field(default=None, kw_only=True, compare=False, metadata={"in_file": False})
+    # The arrays that need no mending, also in a copy with other laws.
+    _mended: Any = field(default=None, kw_only=True, compare=False, metadata={"in_file": False})
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        given = self.vertices, self.triangles, self.group, self.names
+        if self._mended is None or any(a is not b for a, b in zip(self._mended, given, strict=True)):
+            self._mend()
         if self.open:
             for name in ("motion", "mass", "inertia"):
                 if (value := getattr(self, name)) is not None:
@@ -126,13 +120,6 @@ class Mesh(Surface):
                     f"openings must be left out for an open mesh, got {len(self.openings)}: particles go around its "
                     "edges; leave the triangles out that are open, or give them as a mesh of their own with present"
                 )
-        given = self.vertices, self.triangles, self.group, self.names
-        if self._made is None or any(a is not b for a, b in zip(self._made.given, given, strict=True)):
-            made = self._mended()
-            given = made.vertices, made.triangles, made.group, made.names
-            settled = {"scale": 1.0, "weld": None, "mesh_weld": made.weld or self.mesh_weld or None}
-            own = dict(zip(("vertices", "triangles", "group", "names"), given, strict=True))
-            checks.assign(self, **own, **settled, _made=made._replace(given=given))
         object.__setattr__(self, "groups", self._checked_groups())
         if self.groups and self.reacts():
             raise SceneError(
@@ -140,8 +127,8 @@ class Mesh(Surface):
                 "whole mesh one law, or a motion instead"
             )
 
-    def _mended(self) -> _Made:
-        """The triangles of the file or the arrays."""
+    def _mend(self) -> None:
+        """Take the triangles of the file or the arrays, mended, in place of what was given."""
         with needed_by("a mesh", "mesh"):
             import scipy.spatial  # noqa: F401
         path = Path("of these arrays")
@@ -152,11 +139,14 @@ class Mesh(Surface):
             soup = read_soup(path, self.scale)
         else:
             soup = given_arrays(self.vertices, self.triangles, self.group, self.names, self.scale)
-        made = (sheets if self.open else closed)(path, soup, self.weld)
-        mesh = sorted_by_place(made)
+        # What is in a plane encloses nothing, so that it cannot be a closed mesh that is damaged.
+        is_open = self.open or all_in_a_plane(soup.vertices, soup.triangles)
+        mesh = sorted_by_place((sheets if is_open else closed)(path, soup, self.weld))
         for values in (mesh.vertices, mesh.triangles, mesh.group):
             values.flags.writeable = False
-        return _Made((), mesh.vertices, mesh.triangles, mesh.group, mesh.names, mesh.weld)
+        own = {name: getattr(mesh, name) for name in ("vertices", "triangles", "group", "names")}
+        settled = {"scale": 1.0, "weld": None, "mesh_weld": mesh.weld or self.mesh_weld or None, "open": is_open}
+        checks.assign(self, **own, **settled, _mended=tuple(own.values()))
 
     def _checked_groups(self) -> dict[str, dict[str, Any]] | None:
         """The argument `groups`."""
@@ -287,7 +277,7 @@ class Mesh(Surface):
         vertices = np.where(in_plane(self.corners, plane)[:, None], self.vertices + by * own, self.vertices)
         vertices.flags.writeable = False
         # Nothing is to be mended, and triangles and faces keep their numbers.
-        made = replace(self, vertices=vertices, _made=self._made._replace(given=(vertices, *self._made.given[1:])))
+        made = replace(self, vertices=vertices, _mended=(vertices, *self._mended[1:]))
         planes[number, 3] += by
         made.__dict__["_planes"] = planes
         return made
