@@ -110,8 +110,12 @@ def test_the_first_sentence_is_raised_and_what_is_supported_is_not():
         knows.require_supported(asked(warm, POINT, swarm.Verlet(1e-3, 1e3)))
     knows.require_supported(asked(warm, BALL, PENALTY))
     heavy = swarm.Scene([swarm.Sphere(0.5, mass=2.0)])
-    with pytest.raises(swarm.SceneError, match=r"^surfaces\[0\].mass .* with particles that have a radius and Penalty"):
-        knows.require_supported(asked(heavy, BALL, PENALTY))
+    knows.require_supported(asked(heavy, BALL, PENALTY))
+    with pytest.raises(swarm.SceneError, match=r"^surfaces\[0\].mass must be None with Penalty, got 2; use Impact$"):
+        knows.require_supported(asked(heavy, POINT, PENALTY))
+    turning = swarm.Scene([swarm.Sphere(0.5, inertia=2.0, motion=swarm.Rotation((0.0, 0.0, 1.0), 0.0))])
+    with pytest.raises(swarm.SceneError, match=r"^surfaces\[0\].inertia .* that have a radius and Penalty"):
+        knows.require_supported(asked(turning, BALL, PENALTY))
 
 
 def test_the_guide_shows_the_table():

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..errors import SceneError
-from ..grains.soft import require_soft_balls
+from ..grains.matter import require_soft_balls
 from ..methods.base import Method
 from ..pairs import MOST_PRESSED
 from ..particles import Particles

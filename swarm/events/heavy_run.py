@@ -7,13 +7,13 @@ import numpy as np
 from ..compiled_scene import CompiledScene
 from ..contact.laws import Laws
 from ..kernel.vector import ZERO, vec
-from ..run.observed import Observed
+from ..run.observed import Observed, observed_of
 from ..scene import Scene
 from ..state import Floats
 from ..surfaces.depth import penetration
 from .balls_run import CollidingRun
 from .colliding.heavy import COUNTS, Heavy
-from .reacting.described import freedoms_of, observed, scenery_of, walls_now
+from .reacting.described import freedoms_of, scenery_of, walls_now
 from .reacting.freedoms import Freedoms, alone
 
 
@@ -67,7 +67,7 @@ class HeavyRun(CollidingRun):
         for wall in scenery.reacting:
             wall.freedom.push(freedoms, since, ZERO, ZERO)
         freedoms.time.fill(0.0)
-        self._observed = observed(self._scene, freedoms, moment)
+        self._observed = observed_of(self._scene, freedoms, moment)
         return walls_now(self._compiled, scenery, freedoms)
 
     def _scale_of(self, seen: dict[str, Any]) -> float:

@@ -19,7 +19,7 @@ from ..run import failures
 from ..run.base import Arrays, BaseRun
 from ..run.doors import comers, require_free
 from ..run.impacts import ThreadLog
-from ..run.observed import Observed
+from ..run.observed import Observed, observed_of
 from ..run.preflight.counting import counters_of, with_counters
 from ..run.present import Presence
 from ..run.starting_state import Seeding
@@ -27,7 +27,7 @@ from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..state import State, none_left
 from .reacting import queue as events
-from .reacting.described import freedoms_of, observed, scenery_of, walls_now
+from .reacting.described import freedoms_of, scenery_of, walls_now
 from .reacting.freedoms import TOO_LONG, TOO_SHORT
 from .reacting.queue import CLOCK, NOW, TAKEN, Queue, ReactionRule, SceneWalls
 
@@ -188,7 +188,7 @@ class ReactingRun(BaseRun):
 
     def _show(self, moment: float) -> None:
         self._present.reach(moment)
-        self._observed = observed(self._scene, self._freedoms, moment)
+        self._observed = observed_of(self._scene, self._freedoms, moment)
         self._walls = walls_now(self._compiled, self._scenery, self._freedoms)
 
     def _scale_of(self, seen: dict[str, Any]) -> float:

@@ -35,7 +35,6 @@ from .grain_arrays import (
     KEPT_ROLL,
     LIGHTNESS,
     LISTED,
-    LOST,
     PUSH,
     RADIUS,
     ROLL,
@@ -47,6 +46,7 @@ from .grain_arrays import (
     set_vector,
     vector_at,
 )
+from .heavy_walls import ease_along, note_eases, react, rest_of
 from .vessel import met
 
 
@@ -98,18 +98,21 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
             set_vector(rows, c, START, r0)
             # What round-off has taken of the place, along the normal.
             steep, _bend = own.gap_slope(q0, q0)
-            lost = dot(own.discrete_gradient(r0, r0), vector_at(place, i, LOST))
+            n = own.discrete_gradient(r0, r0)
+            lost = dot(n, rest_of(own, place, i))
             rows[c, SIZE], rows[c, GAP] = q0, own.gap_of(q0) + steep * lost
             set_vector(rows, c, COAST, coast)
             rows[c, EASE] = place[i, LIGHTNESS]
+            note_eases(own, rows, c, n)
+            ease = ease_along(own, rows, c)
             if law.damping is not None:
-                rows[c, DAMPING] = law.damping / math.sqrt(place[i, LIGHTNESS]) / matter.h
+                rows[c, DAMPING] = law.damping / math.sqrt(ease) / matter.h
             way = rising(own, r0, q0, move)
             v, carried = vector_at(speed, i, AFTER), velocity_at_end(own, r0 + move)
             speeds = size_of(v - carried), size_of(v) + size_of(carried)
             first = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
-            rows[c, PUSH], rows[c, GAIN] = begin_solve(first, half * place[i, LIGHTNESS] * square(way.along))
-            rows[c, SCALE] = scale_of(matter, rows[c, PUSH], speeds, place[i, LIGHTNESS])
+            rows[c, PUSH], rows[c, GAIN] = begin_solve(first, half * ease * square(way.along))
+            rows[c, SCALE] = scale_of(matter, rows[c, PUSH], speeds, ease)
             set_vector(rows, c, IMPULSE, rows[c, PUSH] * way.along)
             if near.wall_drag is not None:
                 rows[c, LISTED] = k
@@ -135,6 +138,7 @@ def press_at_wall(matter, law, own, grains, rows, at, share):
     wanted, _slope = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
     rows[c, PUSH] = improved(rows[c, PUSH], wanted, rows[c, GAIN])
     more, part = change_of(OfWall(rows, c), IMPULSE, rows[c, PUSH] * way.along, share)
+    react(own, part)
     off = weight_of(law) * (size_of(more) * rows[c, SCALE])
     return way, v + part * rows[c, EASE], off
 

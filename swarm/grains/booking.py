@@ -29,6 +29,7 @@ from .grain_arrays import (
     vector_at,
     vector_in,
 )
+from .heavy_walls import is_heavy
 from .lanes_of_pairs import (
     balls_of,
     lanes_between,
@@ -41,7 +42,7 @@ from .lanes_of_pairs import (
     turning_in,
     twist_in,
 )
-from .vessel import met, met_member, moves
+from .vessel import gives_work, met, met_member
 
 
 class ContactTotals(NamedTuple):
@@ -159,11 +160,13 @@ def book_wall(matter, law, wall, grains, touches, books, number):
         impulse = vector_at(rows, c, IMPULSE)
         books.impulse[index(number), one] += norm(impulse)
         work = dot(impulse, move)
-        if moves(wall):
+        if gives_work(wall):
             # What it gives is what the ball gains and the contact stores or loses.
             given = work + push * way.change
             give_work(books, index(number), one, given / matter.h)
             work = work - given
+        elif is_heavy(wall):
+            work = work - dot(impulse, own.displacement())
         if law.damping is not None:
             books.dissipated[one] += _lost(matter, work, gap, way.change)
     return deepest

@@ -19,6 +19,7 @@ from ..surfaces.periodic.period import into
 from ..surfaces.presence.openings import is_open
 from .contacts import apart
 from .grain_arrays import AFTER, RADIUS, X, vector_at
+from .heavy_walls import place_on
 from .overlaps import move_of
 from .vessel import met, met_member
 
@@ -35,7 +36,7 @@ def open_wall(matter, wall, numbers, grains, near):
         # Its length is 1 on the wall alone.
         n = own.unit_normal(r)
         foot = r + ((radius - own.distance(r)) / norm(n)) * n
-        near.wall_is_open[c] = is_open(matter.openings, first, foot, 0.0)
+        near.wall_is_open[c] = is_open(matter.openings, first, place_on(own, foot), 0.0)
 
 
 @outlined

@@ -39,7 +39,8 @@ from .grain_arrays import (
     set_vector,
     vector_at,
 )
-from .vessel import met, moves
+from .heavy_walls import ease_across, is_heavy, now, react
+from .vessel import gives_work, met
 
 # The square of the length of a unit vector is this near to 1.
 _UNIT = 8.0 * EPSILON
@@ -105,17 +106,20 @@ def rub_wall(matter, law, wall, grains, touches, number, sweep):
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        if not is_due(sweep, touches.stirred, i):
+        # One with a mass is moved by the contacts of other balls.
+        if not is_heavy(wall) and not is_due(sweep, touches.stirred, i):
             continue
         radius, ease, w = grains.place[i, RADIUS], rows[c, EASE], vector_at(spin, i, AFTER)
         own = met(wall, touches.listed, touches.spans, c, radius)
         way, v, off = press_at_wall(matter, law, own, grains, rows, (c, i), share)
         move = vector_at(rows, c, COAST) + half * v
-        n, (_both, last) = _facing(own, way, radius, vector_at(rows, c, START), move)
+        n, (_both, last) = _facing(now(own), way, radius, vector_at(rows, c, START), move)
         slip = across(v - last - radius * cross(w, n), n)
         before = across(vector_at(rows, c, DRAG), n)
-        new = rubbed(before, slip, ease * (1.0 + ROUNDNESS), law.friction * rows[c, PUSH])
+        slipping = ease_across(own, rows, c, ease * (1.0 + ROUNDNESS))
+        new = rubbed(before, slip, slipping, law.friction * rows[c, PUSH])
         more, part = change_of(OfWall(rows, c), DRAG, new, share)
+        react(own, part)
         set_vector(speed, i, AFTER, v + part * ease)
         set_vector(spin, i, AFTER, w - cross(n, part) * (ROUNDNESS * ease / radius))
         pressed_worst = worse(off, pressed_worst)
@@ -156,5 +160,5 @@ def book_rubbing(matter, wall, grains, near, touches, books, number):
         given = 0.5 * dot(drag, both)
         rows[c, RUBBED] = given - gained
         books.dissipated[one] += given - gained
-        if moves(wall):
+        if gives_work(wall):
             give_work(books, index(number), one, given)

@@ -24,11 +24,13 @@ from ..particles import Particles
 from ..run.base import OUTSIDE, Arrays, BaseRun
 from ..run.doors import comers, require_free
 from ..run.feeding import Feed, There
+from ..run.observed import observed_of
 from ..run.preflight.counting import counters_of, crossed_of, with_counters
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
-from ..state import Balls, State, none_left
+from ..scene import Scene
+from ..state import Balls, Floats, State, none_left
 from . import energy, lists, refused
 from . import grain_arrays as arrays
 from .booking import ContactTotals, MemberCounts
@@ -36,6 +38,7 @@ from .drags import Drags, carry, kept_drags, room_for, set_drags
 from .exits import stored_with_others
 from .faces import Fields
 from .grain_arrays import BEFORE, DONE, KEPT, LOST, SINCE, SKIN, TAKEN, X
+from .heavy_walls import heavy_rows, motion_of, with_heavy
 from .held import held_of
 from .logged import Noting
 from .matter import matter_of
@@ -71,7 +74,7 @@ class GrainsRun(BaseRun):
         rubs, spin = self._matter.rubs, particles.spin
         if spin is None and rubs:
             spin = np.zeros((3, n))
-        feed = None if particles.births is None else Feed(scene, particles, seeding.seed)
+        feed = None if particles.births is None else Feed(scene, particles, seeding.seed, self._is_clear)
         balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
         loses = rubs or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
         ends = laws.may_end
@@ -88,8 +91,8 @@ class GrainsRun(BaseRun):
         if particles.image is not None:
             self.state = self.state._replace(image=particles.image, period=compiled.cell())
         self._image = np.zeros((3, 0), np.int64) if particles.image is None else particles.image.copy()
-        self._fields = Fields(compiled, radius)
-        self._walls = self._fields.walls(0.0, 0.0)
+        self._fields, self._heavy = Fields(compiled, radius), heavy_rows(scene)
+        self._walls = self._walls_of(compiled, 0.0, 0.0)
         super().__init__(compiled, method, n, 1, Tier(compile, (self._matter, self._walls), n), seeding, watched)
         self._instants = scene.instants if scene.has_doors() else None
         # What contacts with walls stored before the instant that has come, and the length of a step [s].
@@ -132,12 +135,32 @@ class GrainsRun(BaseRun):
         if counters is not None:
             passing = Passing(state.mass, state.crossed, state.period, self._pages())
             self._world = self._world._replace(followed=Followed(passing, None))
+        self._world = self._world._replace(heavy=self._heavy)
         self._clock = np.zeros(arrays.CLOCK)
         self._clock[SKIN] = _SKIN * radius.min()
         self._scale, self._stored = 0.0, math.nan
         self._ball_numbers = BallNumbers(scene, particles)
         self._choose_tier()
         self._list()
+
+    def _walls_of(self, compiled: CompiledScene, moment: float, skin: float) -> Any:
+        """The walls in the frame, or its piece, that ends at a moment [s], by the lists' skin [m]."""
+        walls, heavy = self._fields.walls(moment, skin), self._heavy
+        return walls if heavy is None else with_heavy(walls, compiled, heavy, self._matter.h)
+
+    def _scene_now(self) -> Scene:
+        """The scene with the walls that have a mass where they are."""
+        seen = self._observed
+        return self._scene if seen is None else self._scene.placed(seen.position, seen.orientation)
+
+    def _is_clear(self, place: Floats, radius: float, moment: float) -> bool:
+        """Whether a place is clear of the walls that have a mass."""
+        if self._heavy is None:
+            return True
+        # In the frame of each, where it is as it is given.
+        places = place[:, None] - motion_of(self._heavy).shift
+        depths = self._scene.distances_outside(places, 0.0, np.full(places.shape[1], radius))
+        return bool((depths[self._heavy.number, np.arange(places.shape[1])] <= 0.0).all())
 
     def _rows_of(self, some: NDArray[np.int64]) -> arrays.Grains:
         """The rows of particles with these numbers."""
@@ -215,6 +238,8 @@ class GrainsRun(BaseRun):
         while (pairs := kernel(lists.list_pairs)(matter.period, grains, near, cells, skin)) > near.mate.size:
             near = self._make_room(pairs, near.slot.size)
         self._list_walls(kernel, near, skin)
+        if self._heavy is not None:
+            self._heavy.listed[:, :3] = self._heavy.place[:, X : X + 3]
         set_drags(kernel, self._world, kept)
         clock[SINCE] = 0.0
 
@@ -241,7 +266,7 @@ class GrainsRun(BaseRun):
     def _list_walls(self, kernel: Any, near: arrays.Neighbours, skin: float) -> None:
         """List what of the walls is near."""
         if self._fields.reaches(skin):
-            self._walls = self._fields.walls(self._moment, skin)
+            self._walls = self._walls_of(self._compiled, self._moment, skin)
         faces, grains = self._fields.faces, self._world.grains
         while True:
             at = kernel(lists.list_walls)(self._walls, faces, grains, near, skin, self._left())
@@ -291,7 +316,7 @@ class GrainsRun(BaseRun):
             self._clock[SKIN] *= 2.0
             largest = self.state.balls.radius.max()  # type: ignore[union-attr]
             if not self._clock[SKIN] <= _WIDEST * largest:
-                raise RunError(refused.too_far(self._world.grains, 0.5 * _WIDEST, float(largest), self._matter.h))
+                raise RunError(refused.too_far(self._world, 0.5 * _WIDEST, float(largest), self._matter.h))
         self._list()
 
     # --- At an instant -----------------------------------------------------------------------------------
@@ -301,8 +326,8 @@ class GrainsRun(BaseRun):
             return
         if (came := comers(self._scene, instant)).any():
             deepest = OUTSIDE * self._scene.finite_size()
-            require_free(self._scene, self._seen_state(), came, deepest, instant, self._first)
-        self._stored_before = self._stored_at(self._fields.walls(instant, float(self._clock[SKIN])), 0.0)
+            require_free(self._scene_now(), self._seen_state(), came, deepest, instant, self._first)
+        self._stored_before = self._stored_at(self._walls_of(self._compiled, instant, float(self._clock[SKIN])), 0.0)
 
     def _switch_walls(self, span: float) -> None:
         """Lose what contacts stored with walls that went at the instant, by the walls of the piece that begins [s]."""
@@ -336,14 +361,15 @@ class GrainsRun(BaseRun):
 
     def _prepare(self, span: float, moment: float) -> None:
         self._span = span
-        self._walls = self._fields.walls(self._moment, float(self._clock[SKIN]))
-        if not self._cut_short:
-            self._clock[DONE] = 0.0
         if self._instants is not None:
             # Steps of equal lengths, so that the last one ends at the instant.
             openings = self._compiled.openings(moment)
             self._matter = self._matter._replace(h=span / self._steps_in(span), openings=openings)
             self.state = self.state._replace(openings=openings)
+        self._walls = self._walls_of(self._compiled, self._moment, float(self._clock[SKIN]))
+        if not self._cut_short:
+            self._clock[DONE] = 0.0
+        if self._instants is not None:
             self._switch_walls(span)
             if not self._cut_short and self._fields.any_moves():
                 # How long ago they were listed is known in steps.
@@ -415,6 +441,8 @@ class GrainsRun(BaseRun):
 
     def _show(self, moment: float) -> None:
         self._tier.kernel(energy.show)(self._world.grains, self.state, self._world.held)
+        if self._heavy is not None:
+            self._observed = observed_of(self._scene, motion_of(self._heavy), moment)
         image, position = self.state.image, self.state.position
         for axis, length in enumerate(self._scene.period or ()):
             if length is not None and image is not None:
@@ -450,8 +478,12 @@ class GrainsRun(BaseRun):
     def _scale_of(self, seen: dict[str, Any]) -> float:
         """The larger one of now and of the start: kinetic and contact energy, and what weight may make of them."""
         pull = 0.0 if self._scene.gravity is None else math.hypot(*self._scene.gravity)
-        weight = float(self._seen_state().mass.sum()) * pull * self._scene.finite_size()
-        return max(self._scale, float(seen["kinetic_energy"] + seen["contact_energy"] + weight))
+        mass, walls, own = float(self._seen_state().mass.sum()), self._observed, 0.0
+        if walls is not None and self._heavy is not None:
+            mass += float(np.reciprocal(self._heavy.place[:, arrays.LIGHTNESS]).sum())
+            own = float((walls.kinetic + np.abs(walls.potential)).sum())
+        weight = mass * pull * self._scene.finite_size()
+        return max(self._scale, float(seen["kinetic_energy"] + seen["contact_energy"] + weight + own))
 
     def _share_done(self, span: float) -> float:
         return float(self._clock[DONE] / self._steps_in(span))
@@ -461,7 +493,7 @@ class GrainsRun(BaseRun):
         kept = {
             "clock": self._clock, "image": self._image, "grains": world.grains, "near": world.near,
             "books": world.books, "held": None if world.held is None else world.held._replace(mass=None),
-            "crossed": state.crossed,
+            "crossed": state.crossed, "walls": self._heavy,
         }  # fmt: skip
         if state.escape_time is not None or state.absorbed_time is not None:
             # Where those are that are gone, and how fast.

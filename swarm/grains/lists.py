@@ -17,6 +17,7 @@ from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field
 from .cell import nearest
 from .grain_arrays import FACE, RADIUS, X, set_vector, vector_at
+from .heavy_walls import is_heavy
 from .vessel import list_in_field
 
 # More cells than this along an axis, of which three numbers still make one.
@@ -135,8 +136,8 @@ def _depth(wall, r):
 
 @outlined
 def _list_at_wall(wall, grains, near, skin, found):
-    """List the balls near a wall, of one that moves all; how many are listed then."""
-    place, always = grains.place, isinstance(wall, Posed)
+    """List the balls near a wall, of one that moves by itself all; how many are listed then."""
+    place, always = grains.place, isinstance(wall, Posed) and not is_heavy(wall)
     for k in range(place.shape[0]):
         i = index(k)
         if always or _depth(wall.grown(place[i, RADIUS]), vector_at(place, i, X)) > -2.0 * skin:

@@ -1,5 +1,6 @@
-"""The matter of soft balls as kernels take it, from a scene and its method."""
+"""The matter of soft balls as kernels take it, from a scene and its method, and what is checked before a run."""
 
+import logging
 import math
 
 import numpy as np
@@ -7,8 +8,11 @@ from numpy.typing import NDArray
 
 from ..compiled_scene import CompiledScene
 from ..contact.damping import damping_of
+from ..errors import SceneError
+from ..methods import Penalty
 from ..methods.base import Method
 from ..methods.fixed_step import longest_step
+from ..motion import speed_at_start
 from ..pairs import Pairs
 from ..particles import Particles
 from ..scene import Scene
@@ -17,8 +21,11 @@ from .cell import Lengths
 from .contacts import Losses, Matter
 from .overlaps import Limits
 
+_LOG = logging.getLogger("swarm")
 # The least restitution with a damper that steps can follow.
-MOST_DAMPED = 0.01
+_MOST_DAMPED = 0.01
+# Steps in the shortest contact: with fewer than the first there is a warning, which proposes the second.
+_FEWEST, _GOOD = 6.0, 20.0
 
 
 def matter_of(compiled: CompiledScene, method: Method, radius: NDArray[np.float64]) -> Matter:
@@ -51,16 +58,72 @@ def _losses(alpha: float, given: Pairs | Surface) -> Losses:
     return Losses(damping_of(alpha, given.restitution), friction, given.rolling or None)
 
 
-def contact_time(scene: Scene, particles: Particles, method: Method) -> float:
-    """The duration of the shortest contact of two balls without losses [s], with the speed of the fastest.
+def require_soft_balls(scene: Scene, particles: Particles, method: Method) -> None:
+    """Raise a `SceneError` where dampers or steps of soft balls are out of range."""
+    if not isinstance(method, Penalty):
+        return
+    _require_damping(scene)
+    _require_steps(particles, method)
+    _warn_of_steps(scene, particles, method)
+
+
+def _require_damping(scene: Scene) -> None:
+    """Raise a `SceneError` for a restitution that a damper cannot give."""
+    named = [(f"surfaces[{i}]", one.restitution) for i, whole in enumerate(scene.surfaces) for one in whole.surfaces()]
+    for name, value in (*named, *(() if scene.pairs is None else [("pairs", scene.pairs.restitution)])):
+        if value < _MOST_DAMPED:
+            raise SceneError(
+                f"{name}.restitution must be {_MOST_DAMPED:g} or more with Penalty: its dampers grow as it "
+                f"becomes less, got {value:g}"
+            )
+
+
+def _require_steps(particles: Particles, method: Penalty) -> None:
+    """Raise a `SceneError` where a step is so long that the fastest ball can jump over another one."""
+    radius, velocity = particles.radius, particles.velocity
+    assert radius is not None
+    if not len(particles):
+        return
+    fastest = int(np.argmax((velocity**2).sum(axis=0)))
+    moves = method.dt * np.sqrt(((velocity - velocity[:, [fastest]]) ** 2).sum(axis=0))
+    reach = radius + radius[fastest]
+    k = int(np.argmax(moves / reach))
+    if moves[k] > reach[k]:
+        raise SceneError(
+            f"dt must be so small that no particle jumps over another one in a step, got dt = {method.dt:g} s, in "
+            f"which particle {k} moves by {moves[k]:.3g} m against particle {fastest}, and their radii are "
+            f"{reach[k]:.3g} m in all; use dt < {method.dt * reach[k] / moves[k]:.2g} s, or Impact"
+        )
+
+
+def _warn_of_steps(scene: Scene, particles: Particles, method: Penalty) -> None:
+    """Warn where a step is a large part of a contact."""
+    if not len(particles):
+        return
+    lightest, fastest = float(particles.mass.min()), particles.fastest()
+    met = [(0.5 * lightest, fastest, "two of the lightest that meet at the speed of the fastest")]
+    for i, surface in enumerate(scene.surfaces):
+        if (heavy := surface.mass) is not None:
+            speed = fastest + math.hypot(*speed_at_start(surface.motion))
+            met.append((lightest * heavy / (lightest + heavy), speed, f"the lightest and surfaces[{i}], {heavy:g} kg,"))
+    shortest, which = min((_contact_time(scene, method, mass, speed), words) for mass, speed, words in met)
+    if method.dt * _FEWEST > shortest:
+        _LOG.warning(
+            "dt = %g s is long for the contacts of these balls: %s touch for %.3g s; use dt <= %.2g s, or a softer "
+            "penalty", method.dt, which, shortest, shortest / _GOOD,
+        )  # fmt: skip
+
+
+def _contact_time(scene: Scene, method: Penalty, mass: float, speed: float) -> float:
+    """The duration of a contact without losses [s], of a mass that moves alone [kg] and comes with a speed [m/s].
 
     Of m g'' = -alpha g^a from g = 0 with the speed u: 2 sqrt(pi) Gamma(1 + p)/Gamma(1/2 + p) G/u, where p = 1/(a + 1)
     and G is the deepest gap, m u^2/2 = alpha G^(a + 1)/(a + 1).
     """
-    a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
-    mass, p = 0.5 * float(particles.mass.min()), 1.0 / (a + 1.0)
+    a, alpha = float(method.exponent), float(method.penalty)
+    p = 1.0 / (a + 1.0)
     fall = math.hypot(*(scene.gravity or (0.0,))) * scene.finite_size()
-    speed = math.sqrt(particles.fastest() ** 2 + 2.0 * fall)
+    speed = math.sqrt(speed**2 + 2.0 * fall)
     if a == 1.0:
         return math.pi * math.sqrt(mass / alpha)
     if speed == 0.0:

@@ -21,6 +21,7 @@ from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
 from .contacts import apart
 from .grain_arrays import AFTER, BEFORE, BEGIN, END, RADIUS, X, vector_at
+from .heavy_walls import is_heavy, now
 from .vessel import is_of_faces, met, moves
 
 # Columns of the failure of a step: the place of a ball in the order of cells, that of the other one or -1, the wall or
@@ -94,8 +95,11 @@ def look_at_wall(matter, wall, grains, near, failed, number):
         own = met(wall, near.listed, near.spans, c, radius)
         overlap = max(own.gap_of(own.inner(r)), own.gap_of(own.end_inner(r + move)))
         if isinstance(wall, Field) and moves(wall):
-            start = wall.members.own_place(r)
-            r, move = start, wall.members.own_end(r + move) - start
+            field = now(wall.members)
+            start = field.own_place(r)
+            r, move = start, field.own_end(r + move) - start
+        elif is_heavy(wall):
+            move = move - own.displacement()
         if not moves(wall):
             # A step over an edge
             overlap = max(overlap, own.gap_of(own.inner(r + 0.5 * move)))

@@ -25,15 +25,27 @@ def unsolved(moment: float, dt: float) -> str:
     )
 
 
-def too_far(grains: Any, most: float, largest: float, dt: float) -> str:
+def too_far(world: Any, most: float, largest: float, dt: float) -> str:
     """Of a move by more than so many radii of the largest ball [m], for which there are no lists."""
-    speed = grains.speed
-    squares = (speed[:, BEFORE : BEFORE + 3] ** 2 + speed[:, AFTER : AFTER + 3] ** 2).sum(axis=1)
-    k = int(np.argmax(np.where(np.isnan(squares), np.inf, squares)))
+    found = (*_fastest(world.grains), "particle ")
+    if world.heavy is not None:
+        found = max((*_fastest(world.heavy), "surface "), found)
+    _square, number, what = found
     return (
-        f"a step failed at particle {grains.number[k]}: it moves by more than {most:g} radii of the largest ball, "
+        f"a step failed at {what}{number}: it moves by more than {most:g} radii of the largest ball, "
         f"{largest:g} m, in a step of {dt:g} s; use a smaller dt"
     )
+
+
+def _fastest(rows: Any) -> tuple[float, int]:
+    """The largest sum of squares of the velocities at both ends of a step, infinite for no number, and of which one."""
+    if not len(rows.number):
+        return 0.0, -1
+    speed = rows.speed
+    squares = (speed[:, BEFORE : BEFORE + 3] ** 2 + speed[:, AFTER : AFTER + 3] ** 2).sum(axis=1)
+    squares = np.where(np.isnan(squares), np.inf, squares)
+    k = int(np.argmax(squares))
+    return float(squares[k]), int(rows.number[k])
 
 
 def sent_wrong(compiled: CompiledScene, world: Any, moment: float) -> str:

@@ -32,7 +32,7 @@ from .grain_arrays import (
     vector_at,
 )
 from .lanes_of_pairs import pair_at
-from .vessel import met, moves
+from .vessel import gives_work, met
 
 
 def _ease(place, i):
@@ -154,5 +154,5 @@ def book_rolling(wall, grains, near, touches, books, number):
         given = dot(roll, _spin_of(wall, grains, touches, c, i))
         rows[c, RUBBED] += given - gained
         books.dissipated[one] += given - gained
-        if moves(wall):
+        if gives_work(wall):
             give_work(books, index(number), one, given)

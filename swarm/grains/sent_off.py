@@ -36,7 +36,7 @@ from .grain_arrays import (
 )
 from .held import hold
 from .overlaps import BALL, WALL
-from .vessel import met, met_member, moves
+from .vessel import gives_work, met, met_member
 
 
 class Sender(NamedTuple):
@@ -114,7 +114,7 @@ def _act(wall, own, world, at, time):
     books.impulse[row, one] += besides
     if world.noting is not None:
         world.near.wall_drag[index(int(touches.wall_rows[c, LISTED])), PRESSED] += besides
-    if moves(wall):
+    if gives_work(wall):
         turned = given(u, v - before)
         give_work(books, row, one, 0.5 * mass * (bounce.work - turned))
     heat = book_energy(books, (row, one, one), mass, bounce)

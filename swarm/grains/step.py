@@ -34,6 +34,7 @@ from .grain_arrays import (
     set_vector,
     vector_at,
 )
+from .heavy_walls import begin_walls, fly_wall, is_heavy, push_back
 from .held import let_go
 from .lanes_of_pairs import group_pairs, push_pairs, rub_pairs, sweep_pairs, twist_pairs
 from .logged import log_pairs, log_wall, note_pairs, note_wall
@@ -96,6 +97,7 @@ class World(NamedTuple):
     sender: Any = None  # `Sender`, or None where no wall sends balls off
     held: Any = None  # `Held`, or None where no wall holds balls
     noting: Any = None  # `Noting`, or None in a run without a log of contacts
+    heavy: Any = None  # `Grains` of the walls with a mass, or None
 
 
 # --- Of one step -----------------------------------------------------------------------------------------
@@ -170,6 +172,14 @@ def _push(matter, walls, world):
     _fly(matter, grains)
     for k in range(len(walls.each)):
         push_walls(matter.walls[k], grains, touches, k)
+    if world.heavy is not None:
+        # Walls of one surface move together.
+        for wall in walls.each:
+            if is_heavy(wall):
+                fly_wall(wall)
+        for k, wall in enumerate(walls.each):
+            if is_heavy(wall):
+                push_back(matter.walls[k], wall, touches, k)
 
 
 def _push_again(matter, walls, world):
@@ -405,18 +415,42 @@ def _swept(matter, walls, listed, grains, skin):
     """The `SweptWall` of all fields that move, which were `listed` so."""
     found = SweptWall(0.0, 0.0)
     for (_number, field), (_first, then) in zip(walls.fields(), listed.fields(), strict=True):
-        if moves(field):
+        if moves(field) and not is_heavy(field):
             one = sweep_of(field.members, then.members, matter, grains, skin)
             found = SweptWall(worse(one.farthest, found.farthest), worse(one.longest, found.longest))
     return found
 
 
+def _begins(matter, walls, listed, world, skin):
+    """`_begin` of balls and of walls with a mass, within the lists of fields that move too."""
+    if not _begin(matter, world.grains, world.touches, skin):
+        return False
+    if world.heavy is not None and not begin_walls(world.heavy, matter.h) <= 0.25 * skin * skin:
+        return False
+    return _swept(matter, walls, listed, world.grains, skin).farthest <= 0.25 * skin * skin
+
+
+def _swept_in_all(matter, walls, listed, world, skin, travel):
+    """The `SweptWall` of balls and walls together; `travel` is that of balls."""
+    sweep = _swept(matter, walls, listed, world.grains, skin)
+    farthest, longest = worse(sweep.farthest, travel.from_list), worse(sweep.longest, travel.longest)
+    if world.heavy is None:
+        return SweptWall(farthest, longest)
+    of_walls = travel_of(matter, world.heavy)
+    both = math.sqrt(longest) + math.sqrt(of_walls.longest)
+    return SweptWall(worse(of_walls.from_list, farthest), both * both)
+
+
+def _arrive_walls(matter, world):
+    """The walls with a mass at the end of the step."""
+    if world.heavy is not None:
+        _arrive(matter, world.heavy)
+
+
 def _step(matter, walls, listed, world, skin):
     """One step but for its end: its `Status`; LEASE_ENDED where the lists do not hold over it, nothing has changed."""
     grains = world.grains
-    if not _begin(matter, grains, world.touches, skin):
-        return Status.LEASE_ENDED.value
-    if not _swept(matter, walls, listed, grains, skin).farthest <= 0.25 * skin * skin:
+    if not _begins(matter, walls, listed, world, skin):
         return Status.LEASE_ENDED.value
     if matter.openings is not None:
         _open(matter, walls, world)
@@ -434,12 +468,11 @@ def _step(matter, walls, listed, world, skin):
         # Those of the new contacts, which are to be summed after the others.
         _forget_given(grains)
         _push_again(matter, walls, world)
-    sweep = _swept(matter, walls, listed, grains, skin)
-    farthest, longest = worse(sweep.farthest, travel.from_list), worse(sweep.longest, travel.longest)
-    if not farthest <= 0.25 * skin * skin:
+    sweep = _swept_in_all(matter, walls, listed, world, skin, travel)
+    if not sweep.farthest <= 0.25 * skin * skin:
         return Status.LEASE_ENDED.value
     deepest, limits = _book(matter, walls, world), matter.limits
-    if deepest > limits.overlap or longest > limits.move * limits.move:
+    if deepest > limits.overlap or sweep.longest > limits.move * limits.move:
         status = _look(matter, walls, world)
         if status != Status.DONE.value:
             return status
@@ -479,6 +512,7 @@ def march(matter, walls, world, clock, rule):
         sent = Status.DONE.value if world.sender is None else _send_off(matter, now, world, time)
         if world.noting is not None:
             _log(matter, now, world, time)
+        _arrive_walls(matter, world)
         clock[DONE] += 1.0
         clock[TAKEN] += 1.0
         clock[SINCE] += 1.0

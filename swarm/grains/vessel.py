@@ -24,6 +24,7 @@ from ..surfaces.outlines.round_side import RoundSide
 from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
 from .grain_arrays import AFTER, BEFORE, BEGIN, END, FACE, RADIUS, X, vector_at
+from .heavy_walls import is_heavy
 
 
 class NearestMembers(Smooth):
@@ -103,6 +104,11 @@ def met_member(wall, listed, spans, k, radius, r):
 def moves(wall):
     """Whether a wall or a field moves: a constant for the compiler."""
     return isinstance(wall.members if isinstance(wall, Field) else wall, Posed)
+
+
+def gives_work(wall):
+    """Whether a wall moves by itself, so that its work is booked: what one with a mass gives it loses."""
+    return moves(wall) and not is_heavy(wall)
 
 
 # --- Lists -----------------------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from ..kernel.arrays import kept
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import outlined, select
 from ..kernel.vector import Vec, dot, square
+from ..motion import speed_at_start
 from ..particles import Particles
 from ..scene import Scene
 from ..surfaces.in_motion.drive import drive_of
@@ -189,6 +190,8 @@ def _pace(surface: Surface, balls: bool = False) -> float:
     """A bound of the speed with which a surface moves [m/s]; of balls without what turns, which their lists follow."""
     if surface.motion is None:
         return 0.0
+    if surface.reacts():
+        return math.hypot(*speed_at_start(surface.motion))
     drive = drive_of(surface, 0.0)
     turns = 0.0 if balls else drive.angular_speed() * (surface.extent() + math.hypot(*drive.center))
     fastest: float = drive.fastest + turns

@@ -178,6 +178,13 @@ class Guide(Given):
         return Led(point_of(start), np.zeros(3), np.zeros(3), np.zeros(3), 0.0)
 
 
+def speed_at_start(motion: Any) -> Floats:
+    """The velocity (3,) with which a wall that has a mass and does not turn begins [m/s]."""
+    if isinstance(motion, Translation):
+        return np.array(motion.velocity, np.float64)
+    return motion.speed * unit_axis(motion) if isinstance(motion, Guide) else np.zeros(3)
+
+
 @dataclass(frozen=True)
 class Placed(Given):
     """A wall that stays where a run has moved it: what is given at xi is at position + orientation xi.

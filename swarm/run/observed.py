@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..motion import Guide, Rotation, pose, unit_axis
 from ..scene import Scene
 from ..state import Floats, State
 
@@ -18,6 +19,41 @@ class Observed(NamedTuple):
     spin: Floats  # (surfaces, 3) [rad/s]
     kinetic: Floats  # (surfaces,) [J]
     potential: Floats  # (surfaces,) of gravity and springs, 0 at the start [J]
+
+
+def observed_of(scene: Scene, reacting: Any, moment: float) -> Observed:
+    """The surfaces of a scene at a moment [s].
+
+    `reacting` has, of the walls that react, in their order, the arrays `shift` and `velocity` (3, K) [m], [m/s], and of
+    those that turn `angle` and `rate` (K,) [rad], [rad/s].
+    """
+    count, row = len(scene.surfaces), 0
+    poses, gravity = scene.poses(moment), np.array(scene.gravity or (0.0, 0.0, 0.0))
+    found = Observed(
+        np.array([pose.position() for pose in poses]), np.array([pose.quaternion for pose in poses]),
+        *np.zeros((2, count, 3)), *np.zeros((2, count)),
+    )  # fmt: skip
+    for i, surface in enumerate(scene.surfaces):
+        if not surface.reacts():
+            continue
+        motion, shift, v = surface.motion, reacting.shift[:, row], reacting.velocity[:, row]
+        found.position[i], found.orientation[i] = shift, (1.0, 0.0, 0.0, 0.0)
+        if surface.mass is not None and surface.inertia is None:
+            found.velocity[i] = v
+            found.kinetic[i] = 0.5 * surface.mass * (v**2).sum()
+            stiffness = motion.stiffness if isinstance(motion, Guide) else 0.0
+            found.potential[i] = 0.5 * stiffness * (shift**2).sum() - surface.mass * (gravity * shift).sum()
+        elif surface.inertia is not None:
+            rate = reacting.rate[row]
+            turned = pose(Rotation(motion.axis, reacting.angle[row], motion.center), 1.0)
+            found.position[i], found.orientation[i] = turned.position(), turned.quaternion
+            found.spin[i], found.kinetic[i] = rate * unit_axis(motion), 0.5 * surface.inertia * rate**2
+            if surface.mass is not None:
+                center = np.array(surface.center)  # type: ignore[attr-defined]
+                fallen = turned.placed(center[:, None])[:, 0] - center
+                found.potential[i] = -surface.mass * (gravity * fallen).sum()
+        row += 1
+    return found
 
 
 def gone_of(state: State, far: int, owners: NDArray[np.int64], surfaces: int) -> dict[str, Any]:

@@ -161,7 +161,6 @@ def test_a_cell_is_as_good_as_its_images():
             swarm.Scene([swarm.Sphere(9.0, laws=[swarm.Sticky(0.1)], motion=swarm.Oscillation((0.1, 0.0, 0.0), 1.0))]),
             "must not let particles wait where a wall moves",
         ),
-        (swarm.Scene([swarm.Plane((0.0, 0.0, -1.0), 5.0, mass=1.0)]), "mass"),
     ],
 )
 def test_what_soft_balls_do_not_know_is_refused(scene, words):

@@ -8,8 +8,7 @@ import numpy as np
 from ...compiled_scene import REACTING, CompiledScene
 from ...contact.laws import NONE, Laws
 from ...kernel.vector import Vec, vec
-from ...motion import Guide, Rotation, Translation, pose, unit_axis
-from ...run.observed import Observed
+from ...motion import Guide, Rotation, speed_at_start, unit_axis
 from ...scene import Scene
 from ...state import Floats
 from ...surfaces.fields.members import Members
@@ -117,11 +116,8 @@ def freedoms_of(compiled: CompiledScene, velocity: Floats) -> Freedoms:
     angle, rate, rate_rest, time, turning, widths, until = np.zeros((7, count))
     for k, surface in enumerate(surfaces):
         motion = surface.motion
-        if isinstance(motion, Translation):
-            velocity[:, k] = motion.velocity
-        elif isinstance(motion, Guide):
-            velocity[:, k] = motion.speed * unit_axis(motion)
-        elif isinstance(motion, Rotation):
+        velocity[:, k] = speed_at_start(motion)
+        if isinstance(motion, Rotation):
             rate[k] = motion.rate
         size = surface.size() if math.isfinite(surface.size()) else scene.finite_size()
         widths[k] = width if surface.inertia is None else width / size
@@ -131,37 +127,6 @@ def freedoms_of(compiled: CompiledScene, velocity: Floats) -> Freedoms:
         if isinstance(wall.freedom, Pendulum):
             wall.freedom.expand(made)
     return made
-
-
-def observed(scene: Scene, freedoms: Freedoms, moment: float) -> Observed:
-    """The surfaces of a scene at a moment [s], at which the walls that react have been brought to the time 0."""
-    count, row = len(scene.surfaces), 0
-    poses, gravity = scene.poses(moment), np.array(scene.gravity or (0.0, 0.0, 0.0))
-    found = Observed(
-        np.array([pose.position() for pose in poses]), np.array([pose.quaternion for pose in poses]),
-        *np.zeros((2, count, 3)), *np.zeros((2, count)),
-    )  # fmt: skip
-    for i, surface in enumerate(scene.surfaces):
-        if not surface.reacts():
-            continue
-        motion, shift, v = surface.motion, freedoms.shift[:, row], freedoms.velocity[:, row]
-        found.position[i], found.orientation[i] = shift, (1.0, 0.0, 0.0, 0.0)
-        if surface.mass is not None and surface.inertia is None:
-            found.velocity[i] = v
-            found.kinetic[i] = 0.5 * surface.mass * (v**2).sum()
-            stiffness = motion.stiffness if isinstance(motion, Guide) else 0.0
-            found.potential[i] = 0.5 * stiffness * (shift**2).sum() - surface.mass * (gravity * shift).sum()
-        elif surface.inertia is not None:
-            rate = freedoms.rate[row]
-            turned = pose(Rotation(motion.axis, freedoms.angle[row], motion.center), 1.0)
-            found.position[i], found.orientation[i] = turned.position(), turned.quaternion
-            found.spin[i], found.kinetic[i] = rate * unit_axis(motion), 0.5 * surface.inertia * rate**2
-            if surface.mass is not None:
-                center = np.array(surface.center)  # type: ignore[attr-defined]
-                fallen = turned.placed(center[:, None])[:, 0] - center
-                found.potential[i] = -surface.mass * (gravity * fallen).sum()
-        row += 1
-    return found
 
 
 def walls_now(compiled: CompiledScene, scenery: SceneWalls, freedoms: Freedoms) -> Walls:

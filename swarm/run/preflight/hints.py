@@ -207,7 +207,7 @@ def _warn_of_steps(task: Task, speed: float, crossing: float) -> None:
 def _contact(task: Task, speed: float) -> tuple[float, float]:
     """How long the shortest contact with a soft wall lasts [s], and how deep the fastest sinks in [m].
 
-    The gap g obeys m g'' = -alpha s^2 g^a, with the slope s of phi: see `contact_time` of grains.
+    The gap g obeys m g'' = -alpha s^2 g^a, with the slope s of phi: see `_contact_time` of grains.
     """
     scene, particles, method = task.scene, task.particles, task.method
     mass, p = particles.mass[_some(len(particles))].min(), 1.0 / (method.exponent + 1.0)  # type: ignore[attr-defined]

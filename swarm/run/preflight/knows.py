@@ -122,6 +122,12 @@ def _masses(asked: Asked) -> Found:
             yield {"i": i, "got": one, "name": name, "value": f"{value:g}" if isinstance(value, float) else value}
 
 
+def _heavy_laws(asked: Asked) -> Found:
+    for i, wall in asked.scene.pieces.owned():
+        if asked.scene.surfaces[i].reacts() and (wall.laws or wall.temperature is not None):
+            yield {"i": i, "got": wall}
+
+
 def _rotations(asked: Asked) -> Found:
     for i, wall in asked.scene.pieces.owned():
         if wall.motion is not None and drive_of(wall, 0.0).turn is not None:
@@ -592,11 +598,20 @@ CAPABILITIES = (
         ),
         _FIXED_STEPS: _with_method("{name}", "None", "value"),
         (CHORDS,): _LOSES,
-        (GRAINS,): Refusal(
-            f"surfaces[{{i}}].{{name}} must be None with {_WITH_PENALTY}, got {{value}}",
-            f"{_TO_MOTION}, or use Impact",
-        ),
     }),
+    Capability("inertia of a wall", _of_walls("inertia", None), {
+        (GRAINS,): Refusal(
+            f"surfaces[{{i}}].inertia must be None with {_WITH_PENALTY}, got {{got}}: its contacts push a wall and do "
+            "not turn it",
+            f"give it a mass and a Guide, or {_TO_MOTION}, or use Impact",
+        ),
+    }, within="mass of a wall"),
+    Capability("laws of a wall with a mass", _heavy_laws, {
+        (GRAINS,): Refusal(
+            f"surfaces[{{i}}] must have no temperature and no laws where it has a mass with {_WITH_PENALTY}, got "
+            "{got!r:.200}", "leave them out, or the mass, or use Impact",
+        ),
+    }, True),
     Capability("mass of a union", _heavy_rooms, {
         (MASSIVE,): Refusal(
             "surfaces[{i}].{name} must be None for a {kind} of several rooms and particles without a radius, got "

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...contact.damping import damping_of
 from ...methods.base import Method
+from ...motion import speed_at_start
 from ...pairs import MOST_PRESSED, Pairs
 from ...particles import Particles
 from ...scene import Scene
@@ -85,6 +86,8 @@ def _pace(surface: Surface) -> float:
     """A bound of the speed of a surface with a motion [m/s]."""
     if surface.motion is None:
         return 0.0
+    if surface.reacts():
+        return math.hypot(*speed_at_start(surface.motion))
     drive = drive_of(surface, 0.0)
     turns = 0.0 if drive.turn is None else math.hypot(*drive.spin) * (surface.extent() + math.hypot(*drive.center))
     return drive.fastest + turns

@@ -1,0 +1,271 @@
+"""Walls with a mass, which contacts of soft balls push: each is one more unknown of a step.
+
+A wall of the mass M goes from the displacement D0 to D1 = D0 + h (V0 + V1)/2, as a ball does. The impulse J of each
+contact on a ball is -J on the wall, along the axis if that is on a guide, with the spring k. With its weight M a
+    M (V1 - V0) = h (M a - k (D0 + D1)/2) - sum J,
+where the force of the spring is the discrete gradient of k D^2/2: so momentum and energy are kept with the wall's.
+Solved for V1, with c = h^2 k/(4 M):
+    V1 = ((1 - c) V0 + h (a - k/M D0))/(1 + c) - sum J/(M (1 + c)).
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..compiled_scene import CompiledScene
+from ..kernel.arrays import index
+from ..kernel.jit import Array, outlined
+from ..kernel.record import Record
+from ..kernel.vector import ZERO, Vec, dot, square, vec
+from ..motion import Guide, speed_at_start, unit_axis
+from ..scene import Scene
+from ..state import Floats
+from ..surfaces.in_motion.drive import PoseDerivatives
+from ..surfaces.in_motion.moving import Marched, Moving
+from ..surfaces.in_motion.posed import Posed
+from ..surfaces.walls import Field, Following, Walls
+from .contacts import worse
+from .grain_arrays import (
+    AFTER,
+    BEFORE,
+    DRAG,
+    EASE,
+    EASES,
+    IMPULSE,
+    LAST,
+    LOST,
+    Grains,
+    X,
+    grains_of,
+    set_vector,
+    vector_at,
+)
+
+
+class FreeMotion(Record):
+    """How a wall with a mass moves, with the rows of `Grains` that say where it is and how fast."""
+
+    row: int
+    lightness: float  # 1/(M (1 + c))
+    axis: Any  # of the guide, or None
+    spring: Any  # k/M of its spring [1/s^2], or None
+    pull: Any  # its acceleration by gravity, along the axis if there is one, or None
+    h: float  # the step [s]
+    place: Array
+    speed: Array
+
+    # It does not turn.
+    turn, spin, late = None, None, 0.0
+
+    @property
+    def center(self):
+        """That of no rotation."""
+        return ZERO
+
+    def at_start(self):
+        """Its pose at the start of the step."""
+        k = index(self.row)
+        return PoseDerivatives(vector_at(self.place, k, X), vector_at(self.speed, k, BEFORE), ZERO, None)
+
+    def at_end(self):
+        """Its pose at the end of the step, by the impulses of now."""
+        k = index(self.row)
+        return PoseDerivatives(vector_at(self.place, k, X) + self.move(), vector_at(self.speed, k, AFTER), ZERO, None)
+
+    def move(self):
+        """Its displacement in the step."""
+        k = index(self.row)
+        return 0.5 * self.h * (vector_at(self.speed, k, BEFORE) + vector_at(self.speed, k, AFTER))
+
+    def lost(self):
+        """What round-off has taken of its displacement."""
+        return vector_at(self.place, index(self.row), LOST)
+
+    def free_velocity(self):
+        """Its velocity at the end of a step without contacts."""
+        k = index(self.row)
+        v, h = vector_at(self.speed, k, BEFORE), self.h
+        gained = ZERO if self.pull is None else h * self.pull
+        if self.spring is None:
+            return v + gained
+        c = 0.25 * h * h * self.spring
+        return ((1.0 - c) * v + (gained - (h * self.spring) * vector_at(self.place, k, X))) / (1.0 + c)
+
+    def push(self, impulse):
+        """Add an impulse to its velocity at the end of the step."""
+        k = index(self.row)
+        change = impulse if self.axis is None else dot(impulse, self.axis) * self.axis
+        set_vector(self.speed, k, AFTER, vector_at(self.speed, k, AFTER) + self.lightness * change)
+
+    def eases(self, n):
+        """What a unit impulse along a normal gives it along that, and the most that one across does across."""
+        if self.axis is None:
+            return self.lightness, self.lightness
+        along = dot(n, self.axis)
+        part = along * along / square(n)
+        return self.lightness * part, self.lightness * (1.0 - part)
+
+
+class HeavyWall(Posed):
+    """A wall with a mass over a step; its `drive` is a `FreeMotion`; grown it is where impulses have brought it."""
+
+    def grown(self, radius):
+        """What the centre of a ball meets of it now."""
+        return self.now()._replace(body=self.body.grown(radius))
+
+    def now(self):
+        """The wall by the impulses of now."""
+        return self._replace(pose=self.drive.at_start(), end=self.drive.at_end())
+
+    def displacement(self):
+        """That of the step: not the difference of two places, which has their round-off."""
+        return self.drive.move()
+
+
+class HeavyMoving(Moving):
+    """A wall with a mass, or a field of them; its `drive` is its `FreeMotion`."""
+
+    def during(self, remaining, after):
+        """The wall over the step; it keeps no time."""
+        return HeavyWall(self.body, self.drive.at_start(), self.drive.at_end(), self.drive, remaining, after)
+
+
+def _own(wall):
+    return wall.members if isinstance(wall, Field) else wall
+
+
+def is_heavy(wall):
+    """Whether a wall or a field has a mass: a constant for the compiler."""
+    return isinstance(_own(wall), HeavyWall)
+
+
+# --- Of one contact; `own` is what the ball meets --------------------------------------------------------
+
+
+def now(own):
+    """A wall by the impulses of now."""
+    return own.now() if isinstance(own, HeavyWall) else own
+
+
+def rest_of(own, place, i):
+    """What round-off has taken of the place of a ball against the wall."""
+    lost = vector_at(place, i, LOST)
+    return lost - own.drive.lost() if isinstance(own, HeavyWall) else lost
+
+
+def place_on(own, r):
+    """A point as the openings of a wall are given: they move with one that has a mass."""
+    return own.own_place(r) if isinstance(own, HeavyWall) else r
+
+
+def note_eases(own, rows, c, n):
+    """Note what the wall yields to impulses along and across the normal."""
+    if isinstance(own, HeavyWall):
+        rows[c, EASES], rows[c, EASES + 1] = own.drive.eases(n)
+
+
+def ease_along(own, rows, c):
+    """The inverse of the mass that moves along the normal."""
+    return rows[c, EASE] + rows[c, EASES] if isinstance(own, HeavyWall) else rows[c, EASE]
+
+
+def ease_across(own, rows, c, ease):
+    """The same across the normal, from that of the ball."""
+    return ease + rows[c, EASES + 1] if isinstance(own, HeavyWall) else ease
+
+
+def react(own, impulse):
+    """Give a wall with a mass the opposite of an impulse on a ball."""
+    if isinstance(own, HeavyWall):
+        own.drive.push(-1.0 * impulse)
+
+
+# --- Of a step -------------------------------------------------------------------------------------------
+
+
+@outlined
+def begin_walls(heavy, h):
+    """The velocities at the end of a step with the last one's change; the square of how far any is then from lists."""
+    place, speed, farthest = heavy.place, heavy.speed, 0.0
+    for k in range(place.shape[0]):
+        i = index(k)
+        v = vector_at(speed, i, BEFORE)
+        set_vector(speed, i, AFTER, v + vector_at(heavy.change, i, LAST))
+        farthest = worse(square(vector_at(place, i, X) + v * h - vector_at(heavy.listed, i, X)), farthest)
+    return farthest
+
+
+def fly_wall(wall):
+    """The velocity of a wall with a mass at the end of a step without contacts."""
+    drive = _own(wall).drive
+    set_vector(drive.speed, index(drive.row), AFTER, drive.free_velocity())
+
+
+@outlined
+def push_back(law, wall, touches, number):
+    """Add the opposite of the impulses of all contacts with a wall to its velocity at the end of the step."""
+    rows, begin, own = touches.wall_rows, touches.wall_spans[0, number], _own(wall)
+    for k in range(begin, begin + touches.wall_spans[1, number]):
+        c = index(k)
+        impulse = vector_at(rows, c, IMPULSE)
+        if law.friction is not None:
+            impulse = impulse + vector_at(rows, c, DRAG)
+        react(own, impulse)
+
+
+# --- From a description ----------------------------------------------------------------------------------
+
+
+def heavy_rows(scene: Scene) -> Grains | None:
+    """The rows of the surfaces with a mass at the start, in their order; None in a scene without them."""
+    heavy = [(i, one) for i, one in enumerate(scene.surfaces) if one.reacts()]
+    if not heavy:
+        return None
+    velocity = np.array([speed_at_start(one.motion) for _i, one in heavy]).T
+    count, mass = len(heavy), np.array([one.mass for _i, one in heavy])
+    made = grains_of(np.zeros((3, count)), velocity, np.zeros(count), mass)
+    return made._replace(number=np.array([i for i, _one in heavy]))
+
+
+class WallMotion(NamedTuple):
+    """Where walls with a mass are, and how fast, as `observed_of` takes it."""
+
+    shift: Floats  # (3, K) [m]
+    velocity: Floats  # (3, K) [m/s]
+
+
+def motion_of(heavy: Grains) -> WallMotion:
+    """The `WallMotion` at the end of a step."""
+    return WallMotion(heavy.place[:, X : X + 3].T, heavy.speed[:, BEFORE : BEFORE + 3].T)  # type: ignore[arg-type]
+
+
+def with_heavy(walls: Walls, compiled: CompiledScene, heavy: Grains, h: float) -> Walls:
+    """The walls of a scene, of which some have a mass, in steps of a length [s]."""
+    scene, row = compiled.scene, {int(i): k for k, i in enumerate(heavy.number)}
+    each: list[Any] = []
+    for i, wall in zip(compiled.numbering.surfaces_of_rows, walls.each, strict=True):
+        if i in row:
+            own = _own(wall)
+            body = own.body if isinstance(own, (Moving, Following)) else own
+            pushed = HeavyMoving(body, _motion_of(scene, i, row[i], heavy, h))
+            wall = wall._replace(members=pushed) if isinstance(wall, Field) else pushed
+        each.append(wall)
+    return Marched(tuple(each), walls.unions, walls.slack, walls.inset)
+
+
+def _motion_of(scene: Scene, i: int, row: int, heavy: Grains, h: float) -> FreeMotion:
+    surface, pull = scene.surfaces[i], None if scene.gravity is None else np.array(scene.gravity)
+    motion, axis, spring, c = surface.motion, None, None, 0.0
+    assert surface.mass is not None
+    if isinstance(motion, Guide):
+        axis = unit_axis(motion)
+        pull = None if pull is None else float((axis * pull).sum()) * axis
+        if motion.stiffness > 0.0:
+            spring = motion.stiffness / surface.mass
+            c = 0.25 * h * h * spring
+    lightness = 1.0 / (surface.mass * (1.0 + c))
+    return FreeMotion(row, lightness, _vector(axis), spring, _vector(pull), h, heavy.place, heavy.speed)
+
+
+def _vector(values: Any) -> Vec | None:
+    return None if values is None else vec(values.tolist())
