@@ -383,6 +383,19 @@ def test_a_lid_in_a_plane_stays_in_it():
     assert abs(result.observables["wall_position"][:, 1, 1]).max() > 1e-3
 
 
+def test_a_lid_lies_on_a_layer_that_repeats():
+    """In the cell that repeats across the axis of its guide the lid is the same everywhere."""
+    lid = swarm.Plane((0.0, 0.0, 1.0), 0.45, mass=0.8, motion=UP, friction=0.3)
+    start = handful(speed=0.3)
+    start.position += np.array([[0.3], [0.3], [0.22]])
+    scene = swarm.Scene([FLOOR, lid], gravity=(0.0, 0.0, -9.81), period=(0.6, 0.7, None))
+    result = ran(scene, start, swarm.Penalty(5e-4, 5e3), 0.2, every=0.1)
+    assert result.observables["energy_error"].max() < 1e-13
+    assert result.observables["wall_position"][-1, 1, 2] < -0.005
+    with pytest.raises(SceneError, match="mass and inertia must be None where the scene has a period"):
+        ran(scene, start, swarm.Impact(), 0.1)
+
+
 def test_a_light_wall_asks_for_short_steps(caplog):
     scene = swarm.Scene([swarm.Sphere(0.65, mass=1e-4)])
     ran(scene, one((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), swarm.Penalty(1e-3, 1e4), 1e-3)
@@ -411,16 +424,20 @@ def test_a_mesh_with_a_mass_is_pushed_as_a_whole():
 
 
 @pytest.mark.parametrize(
-    ("surface", "words"),
+    ("surfaces", "words"),
     [
-        (swarm.Sphere(9.0, mass=1.0, temperature=1.0), "no temperature and no laws where it has a mass"),
-        (swarm.Sphere(9.0, mass=1.0, laws=[swarm.Lambert()]), "no temperature and no laws where it has a mass"),
+        ([swarm.Sphere(9.0, mass=1.0, temperature=1.0)], "no temperature and no laws where it has a mass"),
+        ([swarm.Sphere(9.0, mass=1.0, laws=[swarm.Lambert()])], "no temperature and no laws where it has a mass"),
         (
-            swarm.Box((9.0, 9.0, 9.0), inertia=1.0, motion=swarm.Rotation((0.0, 0.0, 1.0), 0.0)),
+            [swarm.Box((9.0, 9.0, 9.0), inertia=1.0, motion=swarm.Rotation((0.0, 0.0, 1.0), 0.0))],
             "inertia must be None .* give it a mass and a Guide",
+        ),
+        (
+            [swarm.Sphere(9.0, laws=[swarm.Sticky(0.1)]), swarm.Plane((0.0, 0.0, 1.0), 5.0, mass=1.0)],
+            "must not let particles with a radius wait where a wall has a mass",
         ),
     ],
 )
-def test_what_walls_with_a_mass_do_not_know_is_refused(surface, words):
+def test_what_walls_with_a_mass_do_not_know_is_refused(surfaces, words):
     with pytest.raises(SceneError, match=words):
-        ran(swarm.Scene([surface]), handful(), swarm.Penalty(1e-3, 1e4), 0.1)
+        ran(swarm.Scene(surfaces), handful(), swarm.Penalty(1e-3, 1e4), 0.1)

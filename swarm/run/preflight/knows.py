@@ -222,8 +222,12 @@ def _lossy_groups(asked: Asked) -> Found:
 
 def _period(asked: Asked) -> Found:
     is_soft = isinstance(asked.particles, TiedParticles) and not isinstance(asked.method, Impact)
-    if asked.scene.period is not None and (is_soft or not asked.method.supports_period()):
+    if asked.scene.period is None:
+        return
+    if is_soft or not asked.method.supports_period():
         yield {"got": asked.scene.period}
+    elif isinstance(asked.method, Impact):
+        yield from ({"i": i, "got": one} for i, one in enumerate(asked.scene.surfaces) if one.reacts())
 
 
 def _cuts_at_impacts(asked: Asked) -> str | None:
@@ -308,6 +312,13 @@ _LOSES = Refusal(
 )
 _CHANGES = Refusal(
     "contact_step must be 0 where a wall is present, or an opening open, for some times only, got {step:g}", _NO_STEP
+)
+
+
+_WAITS_FOR_A_MASS = Refusal(
+    "surfaces[{i}].laws[{k}] must not let particles with a radius wait where a wall has a mass, got {got!r:.200}: the "
+    "wall may come to where they wait",
+    "use a law without a wait, such as Lambert, or leave the mass out",
 )
 
 
@@ -580,17 +591,16 @@ CAPABILITIES = (
         ),
     }, within="law of a wall"),
     Capability("wait", _waits, {
-        (HEAVY,): Refusal(
-            "surfaces[{i}].laws[{k}] must not let particles with a radius wait where a wall has a mass, got "
-            "{got!r:.200}: the wall may come to where they wait",
-            "use a law without a wait, such as Lambert, or leave the mass out",
-        ),
+        (HEAVY,): _WAITS_FOR_A_MASS,
         (BODIES,): Refusal(
             "surfaces[{i}].laws[{k}] must not let bodies wait, got {got!r:.200}: a wall holds one point of a body, and "
             "the rest would go on",
             "use a law without a wait, such as Lambert, or particles",
         ),
     }, within="law of a wall"),
+    Capability("wait beside a wall with a mass", _where(lambda asked: asked.scene.reacts(), _waits), {
+        (GRAINS,): _WAITS_FOR_A_MASS,
+    }, True),
     Capability("mass of a wall", _masses, {
         _EVERY_BODY: Refusal(
             "surfaces[{i}] must have no mass and no inertia with bodies, got {got}",

@@ -159,7 +159,7 @@ def is_same_along(surface: Surface, k: int, period: Lengths, least: float = _NO_
 
 def _require_place(surface: Surface, period: Lengths, name: str) -> None:
     """Raise a `SceneError` if a surface does not stay where it is along the period, or what it is."""
-    if surface.reacts():
+    if surface.reacts() and not _is_same_in_all(surface, period):
         raise SceneError(f"{name}.{MASS_AND_PERIOD.format(got=surface)}; {WITHOUT_PERIOD}")
     for one in parts_of(surface.motion):
         for k, length in enumerate(period):
@@ -169,6 +169,12 @@ def _require_place(surface: Surface, period: Lengths, name: str) -> None:
                     f"{length:g}, got {one}; move it across the period, or as it "
                     "stays what it is (a plane in itself)"
                 )
+
+
+def _is_same_in_all(surface: Surface, period: Lengths) -> bool:
+    """Whether a wall with a mass stays what it is along the period, wherever it is moved: a lid."""
+    ways = [k for k, length in enumerate(period) if length is not None]
+    return surface.inertia is None and all(_slides(surface, k, period) for k in ways)
 
 
 def _moves_along(motion: Any, k: int, surface: Surface, period: Lengths) -> bool:
