@@ -1,6 +1,7 @@
 """Walls with a mass that soft balls push: closed forms, conservation, and a loop of its own over whole steps."""
 
 import math
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -368,6 +369,17 @@ def test_a_wall_that_goes_loses_what_it_stores_and_a_lid_moves_on():
     result = ran(scene, one((0.0, 0.0, 0.1), (0.0, 0.0, 0.0)), swarm.Penalty(1e-3, 1e4), 0.2, every=0.05)
     assert result.observables["energy_error"].max() < 1e-13
     assert result.observables["wall_position"][-1, 1, 2] < -0.03
+
+
+def test_a_lid_that_comes_is_where_it_has_moved():
+    lid = swarm.Plane(
+        (0.0, 0.0, 1.0), 0.5, mass=1.0, motion=swarm.Guide((0.0, 0.0, 1.0), speed=-1.0), present=[(0.2, math.inf)]
+    )
+    scene = swarm.Scene([FLOOR, lid])
+    for z, is_free in ((0.35, False), (0.15, True)):
+        with nullcontext() if is_free else pytest.raises(swarm.RunError, match=r"surfaces\[1\].* at 0.2 s"):
+            result = ran(scene, one((0.0, 0.0, z), (0.0, 0.0, 0.0)), swarm.Penalty(1e-3, 1e4), 0.3, every=0.1)
+    assert result.observables["wall_velocity"][-1, 1, 2] == pytest.approx(-0.7 / 1.3, rel=1e-12)
 
 
 def test_a_lid_in_a_plane_stays_in_it():
