@@ -70,13 +70,13 @@ def test_a_ball_flies_over_the_middle_of_a_room_to_the_other_wall():
 def test_a_flight_takes_few_looks_at_the_walls_and_none_beyond_them(name, monkeypatch):
     """Looks and bisections to each wall, without those that another one comes before."""
     looks, nearest = [], joined_faces.nearest
-    look = joined_faces._look
+    look = joined_faces.JoinedFaces.look
 
     def counted(*arguments):
         looks.append(arguments)
         return look(*arguments)
 
-    monkeypatch.setattr(joined_faces, "_look", counted)
+    monkeypatch.setattr(joined_faces.JoinedFaces, "look", counted)
     monkeypatch.setattr(joined_faces, "nearest", lambda *arguments: looks.append(arguments) or nearest(*arguments))
     random, walls = np.random.default_rng(2), walls_of(UNIONS[name], 0.05)
     with np.errstate(all="ignore"):
@@ -89,8 +89,10 @@ def test_a_flight_takes_few_looks_at_the_walls_and_none_beyond_them(name, monkey
 @pytest.mark.parametrize("pull", [None, (0.5, 1.0, -3.0)], ids=["straight", "fall"])
 def test_a_flight_within_one_room_is_found_at_one_look(pull, monkeypatch):
     """It is that in the room alone, and other walls of the union are not met."""
-    looks, look = [], joined_faces._look
-    monkeypatch.setattr(joined_faces, "_look", lambda *arguments: looks.append(arguments) or look(*arguments))
+    looks, look = [], joined_faces.JoinedFaces.look
+    monkeypatch.setattr(
+        joined_faces.JoinedFaces, "look", lambda *arguments: looks.append(arguments) or look(*arguments)
+    )
     random, radius, count = np.random.default_rng(2), 0.05, 0
     walls, alone = walls_of(BOXES, radius), walls_of(BOXES.parts[0], radius)
 

@@ -151,11 +151,38 @@ class JoinedFaces(Smooth):
         away, place = nearest(self, r)
         return r + ((away - self.radius) / select(away > 0.0, away, 1.0)) * (place - r)
 
+    @outlined
     def look(self, r, v, pull, t, is_first):
-        return _look(self, r, v, pull, t, is_first)
+        """The `SafeStep` of a flight from the time t on."""
+        p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
+        # Another wall of the union is met on the way out.
+        if not is_first and gap_of(self.rooms, p) > self.slack:
+            return march.SafeStep(t, math.inf, -1.0, -1.0)
+        room = EPSILON * total(absolute(p))
+        way = _in_rooms(self.rooms, self.radius, self.slack, AtInstant(p, w, pull), _WITHIN * room)
+        if way.number >= 0.0:
+            is_own = False
+            for face in self.faces:
+                is_own = is_own | (face.number == way.number)
+            return march.SafeStep(t, select(is_own, way.time, math.inf), select(is_own, 0.0, -1.0), -1.0)
+        if way.time > 0.0:
+            return march.SafeStep(t, way.time, -1.0, -1.0)
+        step = _until_any(self, AtInstant(p, w, pull), math.inf)
+        arrives = (not is_first or step == 0.0) and march.travelled(norm(w), norm(pull), step) <= 2.0 * room
+        if arrives and not is_first:
+            away, place = nearest(self, p)
+            # By more than round-off: an edge bends more than its samples say.
+            if away < self.radius - room and dot(place - p, w) > 0.0:
+                return march.SafeStep(t, 0.0, -1.0, 0.0)
+        return march.SafeStep(t, step, select(arrives, 0.0, -1.0), -1.0)
 
+    @outlined
     def moving_step(self, seen, longest):
-        return _moving_step(self, seen, longest)
+        """The `LevelStep` of the wall with all its faces, edges and tips."""
+        away, place = nearest(self, seen.r)
+        half = 0.5 * dot((place - seen.r) * (1.0 / select(away > 0.0, away, 1.0)), seen.v)
+        step = _until_any(self, AtInstantInFrame(seen.r, seen, longest), longest)
+        return rising.LevelStep(self.radius - away, half, step)
 
 
 @kernel
@@ -435,32 +462,6 @@ class Hidden(rising.Ahead):
 
 
 @outlined
-def _look(wall, r, v, pull, t, is_first):
-    """The `SafeStep` of a flight from the time t on."""
-    p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
-    # Another wall of the union is met on the way out.
-    if not is_first and gap_of(wall.rooms, p) > wall.slack:
-        return march.SafeStep(t, math.inf, -1.0, -1.0)
-    room = EPSILON * total(absolute(p))
-    way = _in_rooms(wall.rooms, wall.radius, wall.slack, AtInstant(p, w, pull), _WITHIN * room)
-    if way.number >= 0.0:
-        is_own = False
-        for face in wall.faces:
-            is_own = is_own | (face.number == way.number)
-        return march.SafeStep(t, select(is_own, way.time, math.inf), select(is_own, 0.0, -1.0), -1.0)
-    if way.time > 0.0:
-        return march.SafeStep(t, way.time, -1.0, -1.0)
-    step = _until_any(wall, AtInstant(p, w, pull), math.inf)
-    arrives = (not is_first or step == 0.0) and march.travelled(norm(w), norm(pull), step) <= 2.0 * room
-    if arrives and not is_first:
-        away, place = nearest(wall, p)
-        # By more than round-off: an edge bends more than its samples say.
-        if away < wall.radius - room and dot(place - p, w) > 0.0:
-            return march.SafeStep(t, 0.0, -1.0, 0.0)
-    return march.SafeStep(t, step, select(arrives, 0.0, -1.0), -1.0)
-
-
-@outlined
 def _in_rooms(rooms, radius, slack, flight, near):
     """The `WayInRooms` of a ball in the room that it stays in the longest; `near` is round-off of its place [m]."""
     way, own, foot, before = WayInRooms(0.0, -1.0), 0, flight.r, 0.0
@@ -488,15 +489,6 @@ def _way_to(wall, number, radius, flight):
     time, meets = _wall_hit(wall.grown(radius), flight)
     there = flight.place(select(time < math.inf, time, 0.0))
     return WayInRooms(time, select(meets, number, -1.0)), there - wall.distance(there) * outward(wall, there)
-
-
-@outlined
-def _moving_step(wall, seen, longest):
-    """The `LevelStep` of a wall with all its faces, edges and tips."""
-    away, place = nearest(wall, seen.r)
-    half = 0.5 * dot((place - seen.r) * (1.0 / select(away > 0.0, away, 1.0)), seen.v)
-    step = _until_any(wall, AtInstantInFrame(seen.r, seen, longest), longest)
-    return rising.LevelStep(wall.radius - away, half, step)
 
 
 def _until_any(wall, flight, longest):

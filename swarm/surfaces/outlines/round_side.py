@@ -114,49 +114,41 @@ class RoundSide(contract.Smooth):
             first = select(time < first, time, first)
         return first, True
 
+    @outlined
     def falling_hit(self, r, v, pull):
-        return _first_fall(self, r, v, pull)
+        """When a fall hits the side: the parallel curve or a circle."""
+        fits, parallel = self.parallel()
+        first, found = math.inf, True
+        if fits:
+            first, found = parallel.falling_hit(r, v, pull)
+        if self.has_ends():
+            for circle in self.ends():
+                time, here = circle.falling_hit(r, v, pull)
+                if time < first:
+                    first, found = time, here
+        return first, found
 
     def safe_time(self, r, v, pull):
         return self.falling_hit(r, v, pull)[0]
 
+    @outlined
     def moving_step(self, seen, longest):
-        return _moving_step(self, seen, longest)
-
-
-@outlined
-def _moving_step(side, seen, longest):
-    """The `LevelStep` of the parallel curve and both circles."""
-    fits, parallel = side.parallel()
-    found = LevelStep(0.0, 0.0, longest)
-    if fits:
-        found = parallel.moving_step(seen, longest)
-    if side.has_ends():
-        for circle in side.ends():
-            step = circle.moving_step(seen, found.time)
-            is_past = (step.level > 0.0) & (step.half > 0.0)
-            level, half = select(is_past, step.level, found.level), select(is_past, step.half, found.half)
-            found = LevelStep(level, half, select(step.time < found.time, step.time, found.time))
-    return found
+        """The `LevelStep` of the parallel curve and both circles."""
+        fits, parallel = self.parallel()
+        found = LevelStep(0.0, 0.0, longest)
+        if fits:
+            found = parallel.moving_step(seen, longest)
+        if self.has_ends():
+            for circle in self.ends():
+                step = circle.moving_step(seen, found.time)
+                is_past = (step.level > 0.0) & (step.half > 0.0)
+                level, half = select(is_past, step.level, found.level), select(is_past, step.half, found.half)
+                found = LevelStep(level, half, select(step.time < found.time, step.time, found.time))
+        return found
 
 
 def _whole(part):
     return select(part > 0.25, 1.0, 0.0)
-
-
-@outlined
-def _first_fall(side, r, v, pull):
-    """When a fall hits a side: the parallel curve or a circle."""
-    fits, parallel = side.parallel()
-    first, found = math.inf, True
-    if fits:
-        first, found = parallel.falling_hit(r, v, pull)
-    if side.has_ends():
-        for circle in side.ends():
-            time, here = circle.falling_hit(r, v, pull)
-            if time < first:
-                first, found = time, here
-    return first, found
 
 
 def round_side(wall: Any) -> Any:
