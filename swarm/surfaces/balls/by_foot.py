@@ -21,6 +21,7 @@ from ...kernel.limits import EPSILON, TINY
 from ...kernel.vector import ZERO, Symmetric, Vec, dot, norm, square, total
 from .. import contract
 from ..time_of_impact.course import rise_time
+from .at_radius import AtRadius
 from .foot_hit import applied, first_impact, inverse, matrix
 
 # Newton's steps to a foot; near it each one doubles the digits. The last one is shorter than this part of the distance.
@@ -45,7 +46,7 @@ class Foot(NamedTuple):
     sure: Any
 
 
-class ByFoot(contract.Smooth):
+class ByFoot(AtRadius):
     """What is so far within the admissible side of a wall `body`."""
 
     body: Any
@@ -57,9 +58,6 @@ class ByFoot(contract.Smooth):
     known: float  # a distance up to twice which from the wall m is certain
 
     side = 1.0
-
-    def grown(self, radius):
-        return self._replace(radius=radius)
 
     @outlined
     def foot(self, r):
@@ -107,12 +105,6 @@ class ByFoot(contract.Smooth):
 
     def gradient(self, r):
         return self.foot(r).normal
-
-    def distance(self, r):
-        return self.phi(r)
-
-    def unit_normal(self, r):
-        return self.gradient(r)
 
     def project(self, r):
         found = self.foot(r)

@@ -5,7 +5,7 @@ from typing import Any
 
 from ...kernel.jit import outlined, select
 from ...kernel.vector import Vec, either, norm, square, times
-from .. import contract
+from ..balls.at_radius import AtRadius
 from ..balls.tube import Tube
 from ..rotation import Rotated
 from ..time_of_impact.course import ball_rise_time
@@ -16,25 +16,18 @@ from .sides import Side
 _LEAST = 1e-12
 
 
-class RoundSide(contract.Smooth):
+class RoundSide(AtRadius):
     """All that is within the radius of a ball from one side; phi is the distance outside of what is admissible."""
 
     wall: Side
     radius: float
 
     side = 1.0
-    holds_balls = True
-
-    def grown(self, radius):
-        return self._replace(radius=radius)
 
     # --- The distance ---
 
     def phi(self, r):
         return self.wall.distance(r) + self.radius
-
-    def distance(self, r):
-        return self.phi(r)
 
     def gradient(self, r):
         # Towards the nearest point of the side, or, behind it, away from that
@@ -48,14 +41,6 @@ class RoundSide(contract.Smooth):
         n = either(within, out, to_end)
         length = norm(n)
         return n * (1.0 / select(length > 0.0, length, 1.0))
-
-    unit_normal = gradient
-
-    def far(self, r):
-        return -self.phi(r)
-
-    def out_of(self, r):
-        return -self.phi(r)
 
     def may_reach(self, low, high):
         wall = self.wall
