@@ -65,16 +65,7 @@ def sweep(  # noqa: PLR0913  one argument an option
             raise KeyboardInterrupt
         latest = None if walltime is None else duration("--walltime", walltime)
         options = sweeping.SweepOptions(
-            output,
-            processes,
-            threads,
-            resume,
-            overwrite,
-            not quiet,
-            written,
-            latest,
-            tuple(plugins or ()),
-            cluster,
+            output, processes, threads, resume, overwrite, not quiet, written, latest, tuple(plugins or ()), cluster
         )
         outcome = sweeping.carry_out_sweep(sweep_file, options, first)
     except KeyboardInterrupt:  # the second one

@@ -44,12 +44,12 @@ class ImpactSettings(Record):
     touch: float  # distance within which walls hold a sliding particle too [m]
 
 
-class MovingParticle(Record):
-    """A particle, and how much of its frame is left [s]."""
+class ParticleMoment(Record):
+    """A particle at a moment, with so much of the frame left [s]."""
 
     r: Vec
     v: Vec
-    remaining: float
+    remaining: Any
 
 
 class Landing(Record):
