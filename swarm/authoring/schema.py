@@ -138,10 +138,7 @@ def _particles(table: Table) -> Form:
     others = [key.name for key in table.keys if key.name not in _OF_FILES]
     return _object(table) | {
         "anyOf": [{"required": [name]} for name in ("count", "fraction", "from")],
-        "dependentSchemas": {
-            "from": {"properties": dict.fromkeys(others, False)},
-            "frame": {"required": ["from"]},
-        },
+        "dependentSchemas": {"from": {"properties": dict.fromkeys(others, False)}, "frame": {"required": ["from"]}},
     }
 
 

@@ -11,8 +11,7 @@ from .options import Option, Positional
 TrajectoryFile = Annotated[Path, Positional(metavar="FILE.h5", help="A trajectory.")]
 Picture = Annotated[Path | None, Option("-o", "--output", metavar="OUT.png", help="Picture [default: FILE.png].")]
 Plugins = Annotated[
-    list[str] | None,
-    Option("--plugins", metavar="MODULE", help="Allow the file to name code of this module."),
+    list[str] | None, Option("--plugins", metavar="MODULE", help="Allow the file to name code of this module.")
 ]
 Quiet = Annotated[bool, Option("--quiet", help="No progress bar and no summary.")]
 
