@@ -104,7 +104,7 @@ class Job:
     named: tuple[Path, ...] = ()
 
     def inputs(self) -> dict[str, Path | None]:
-        """What a file is -> the file, for all files that are read: none of them can be an output."""
+        """The files that are read, by what they are; none of them may be an output."""
         files: dict[str, Path | None] = {"scene file": self.path, "file of the start": self.start_file()}
         files |= {f"file that the scene reads, {one.name}": one for one in self.named}
         return files | {f"module {name} of --plugins": file for name, file in plugins.files().items()}
@@ -129,7 +129,7 @@ class Job:
         return None if name is None else self.path.parent / name
 
     def located(self, error: SceneError) -> SceneError:
-        """The error, with the row of the .csv file of its particle if it is about one."""
+        """The error; if it is about a particle of a .csv file, with the row of that."""
         file = self.start_file()
         if error.particle is None or file is None or file.suffix.lower() != ".csv":
             return error
@@ -302,7 +302,7 @@ def _bodies_of(table: Any, where: str, path: Path) -> Any:
 
 
 def _named_files(document: dict[str, Any], path: Path) -> Iterator[Path]:
-    """The existing files that a text of the document names, except outputs; with a trajectory also its shards."""
+    """The existing files that texts of the document name, except outputs; of a trajectory its shards too."""
     run = document.get("run")
     read = {key: value for key, value in run.items() if key not in OUTPUTS} if isinstance(run, dict) else {}
     places: list[Any] = [{**document, "run": read}]

@@ -42,7 +42,7 @@ _PACKED = 1024
 
 
 class RunEnd(NamedTuple):
-    """The end of a run; `Result` describes each of these."""
+    """What a run ends with; `Result` describes each field."""
 
     particles: Particles
     observables: dict[str, NDArray[Any]]
@@ -127,9 +127,9 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
 
 @contextlib.contextmanager
 def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display, Watched, Measures]]:
-    """A run at its start or its checkpoint, its `Background` writer or None, its display, its records and its measures.
+    """A context with a run at its start or checkpoint, its `Background` writer or None, display, records and measures.
 
-    Until the context ends signals stop the run, and its files are locked.
+    Until it ends, signals stop the run and its files are locked.
     """
     recorder, watched = recorder_of(task), Watched(log_of(task), tally_of(task), task.options.counters)
     runs: list[BaseRun] = []
@@ -158,7 +158,7 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
 
 
 def _why_slow(scene: Scene) -> str:
-    """Why kernels of this scene may take long to compile, or "": one wall has no fewer to be made of."""
+    """Why kernels of this scene may take long to compile, in a sentence; "" for fewer than two such walls."""
     rough = sum(one.motion is not None and bool(one.friction) for one in scene.surfaces)
     if rough < 2:
         return ""
@@ -226,7 +226,7 @@ def warn_open() -> None:
 
 
 def _meanwhile(session: Session, writer: "Background | None", show: Display) -> tuple[float, float]:
-    """The last arguments of `BaseRun.advance`: the time to write a frame [s], and when it returns at the latest."""
+    """The last two arguments of `BaseRun.advance`: the time to write a frame [s], and the latest time to return."""
     return writer.seconds if writer else 0.0, min(session.latest(writer), time.monotonic() + min(show.every, LOOK))
 
 
