@@ -454,12 +454,16 @@ class Surface(Validated):
 
     def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Gradient of phi at points (3, N); shape (3, N). On an edge it is that of one of the parts."""
+        found = self._own_gradient(points, time)
+        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
+
+    def _own_gradient(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
+        """That gradient in the frame in which the surface is given."""
         rows = self._own_rows(points, time)
         with np.errstate(all="ignore"):
             parts = [np.array(np.broadcast_arrays(*wall.gradient(rows), rows.x)[:3]) for wall in self.walls()]
             largest = np.argmax([wall.phi(rows) for wall in self.walls()], axis=0)
-        found = np.asarray(np.choose(largest, parts))
-        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
+        return np.asarray(np.choose(largest, parts))
 
     def reaching_outside(
         self, points: NDArray[np.float64], radius: NDArray[np.float64], time: float = 0.0

@@ -86,7 +86,7 @@ class JoinedRooms(Surface):
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         return np.asarray(np.min([np.max(gaps, axis=0) for gaps in self._gaps(points, time)], axis=0))
 
-    def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
+    def _own_gradient(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
         rows, gaps = np.array(self._own_rows(points, time)), self._gaps(points, time)
         least, found = np.argmin([np.max(some, axis=0) for some in gaps], axis=0), np.zeros(np.shape(points))
         for k, (room, some) in enumerate(zip(self.rooms_of, gaps, strict=True)):

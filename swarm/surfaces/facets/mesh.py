@@ -339,10 +339,8 @@ class Mesh(Surface):
         found = np.asarray(self._nearest(points, time)[3])
         return found - THIN * self._room if self.open else found
 
-    def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
-        """Gradient of that phi at points (3, N); shape (3, N)."""
-        found = self._nearest(points, time)[:3]
-        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
+    def _own_gradient(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
+        return self._nearest(points, time)[:3]
 
     def _nearest(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
         rows = self._own_rows(points, time)
