@@ -194,8 +194,8 @@ def test_steps_of_balls_take_longer_in_a_union():
 
 
 @pytest.mark.parametrize(
-    ("seconds", "said"),
+    ("seconds", "words"),
     [(0.34, "0.3 s"), (9.7, "10 s"), (10.4, "10 s"), (119.0, "119 s"), (7100.0, "120 min"), (86400.0 * 123, "120 d")],
 )
-def test_times_are_in_plain_digits(seconds, said):
-    assert outlook._about(seconds) == said
+def test_times_are_in_plain_digits(seconds, words):
+    assert outlook._about(seconds) == words
