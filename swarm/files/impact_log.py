@@ -294,13 +294,13 @@ class ImpactLog(Stored):
                 raise ValueError(f"expected particles below {self.count}, got {particle.min()} to {particle.max()}")
             (particles, surfaces, crossings), (begin, end) = wanted, span
             is_impact = wall >= 0
-            surface = np.where(is_impact, self._surface[np.maximum(wall, 0)], -1)
-            of_these = np.where(is_impact, surfaces[surface], crossings)
-            taken = (time >= begin) & (time < end) & particles[particle] & of_these
+            surface = _of_walls(self._surface, wall, -1)
+            taken = (time >= begin) & (time < end) & particles[particle]
+            taken &= _of_walls(surfaces[self._surface], wall, crossings)
             k = np.flatnonzero(taken)
             table = np.empty(len(k), self.dtype)
             table["time"], table["particle"], table["surface"] = time[k], particle[k], surface[k]
-            table["member"] = np.where(is_impact[k], self._member[np.maximum(wall[k], 0)], -1)
+            table["member"] = _of_walls(self._member, wall[k], -1)
             if self._counters:
                 is_event = (is_impact | self._is_collision(rows))[k]
                 table["counter"] = np.where(is_event, -1, (-1 - wall[k]) // 2)
@@ -315,6 +315,11 @@ class ImpactLog(Stored):
 def missing(file: Any) -> str | None:
     """The first part of a log of impacts that this file lacks, or None."""
     return next((name for name in _NEEDED if name not in file), None)
+
+
+def _of_walls(values: NDArray[Any], wall: NDArray[np.integer], other: Any) -> NDArray[Any]:
+    """The value of the wall of each row, `other` where that is below 0: a scene without a surface has no wall."""
+    return np.append(values, other)[np.where(wall >= 0, wall, -1)]
 
 
 def _among(name: str, numbers: Any, n: int) -> NDArray[np.bool_]:

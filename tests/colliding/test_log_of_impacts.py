@@ -58,3 +58,17 @@ def test_impacts_of_members_are_counted():
     scene, start = gas(n=20)
     seen = swarm.simulate(scene, start, swarm.Impact(), until=0.5, compile="never", member_impacts=True)
     assert seen.observables["member_impacts"][-1].sum() == seen.observables["impacts"][-1] > 5
+
+
+def test_a_cell_without_a_surface_has_a_log(tmp_path):
+    _scene, start = gas(n=20, period=(2.0, 2.0, 2.0))
+    counters = [swarm.Plane((0.0, 0.0, 1.0), 1.1)]
+    run, table, counts = logged(tmp_path, swarm.Scene([], period=(2.0, 2.0, 2.0)), start, counters=counters)
+    met = table["partner"] >= 0
+    assert len(counts) == 0
+    assert met.sum() == run.observables["collisions"][-1] > 3
+    assert (table["surface"] == -1).all()
+    assert (table["member"] == -1).all()
+    crossed = [(table["sense"][~met] == sense).sum() for sense in (0, 1)]
+    assert crossed == run.observables["crossings"][-1, 0].tolist()
+    assert min(crossed) > 0
