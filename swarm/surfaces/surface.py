@@ -28,6 +28,8 @@ SIDES = {"inside": 1.0, "outside": -1.0}
 Box = tuple[Vector, Vector]
 HalfSpace = tuple[Vector, float]
 UNBOUNDED: Box = ((-math.inf,) * 3, (math.inf,) * 3)
+# The arguments of a surface on which an impact, or a contact, depends besides its shape and its motion.
+LAWS = "restitution", "friction", "rolling", "temperature", "accommodation", "laws"
 # The number of a part, and of a part of this.
 Place = tuple[int, ...]
 # phi and its gradient (N, 3), functions of points (N, 3).
@@ -320,6 +322,10 @@ class Surface(Validated):
         corner around the balls.
         """
         raise NotImplementedError
+
+    def common(self) -> dict[str, Any]:
+        """The arguments of every surface but its rotation: its laws, and how it moves, where it is open and when."""
+        return {one.name: getattr(self, one.name) for one in fields(Surface) if one.name != "rotation"}
 
     def rooms_of_balls(self) -> "tuple[Any, ...]":
         """The rooms that balls meet: for each the surfaces around it."""

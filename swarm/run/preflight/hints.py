@@ -14,7 +14,7 @@ from ...methods import Impact
 from ...scene import Scene
 from ...surfaces.instant import are_there_together, box_of, gaps_of, side_of
 from ...surfaces.presence.openings import least_distance
-from ...surfaces.surface import Surface
+from ...surfaces.surface import LAWS, Surface
 from ..options import Task
 from . import softness, workload
 
@@ -39,8 +39,6 @@ _ONLY_TOUCH = (
     "or hit the edge of the face, may enter the gap of no width between them; let them overlap, as a post that goes on "
     "below its floor, or make one body of tiles in a row"
 )
-# What an impact on a surface depends on, besides its shape.
-_LAWS = ("restitution", "friction", "rolling", "temperature", "accommodation", "laws", "mass", "inertia")
 
 
 def give(task: Task) -> None:
@@ -278,7 +276,7 @@ def _named(surfaces: Sequence[Surface], number: int, row: int | None) -> str:
 
 def _differ(one: Surface, other: Surface) -> bool:
     """Whether impacts on two surfaces differ."""
-    return any(getattr(one, name, None) != getattr(other, name, None) for name in _LAWS)
+    return any(getattr(one, name, None) != getattr(other, name, None) for name in (*LAWS, "mass", "inertia"))
 
 
 def _cut_one_another(one: Surface, other: Surface, boxes: NDArray[np.float64]) -> bool:

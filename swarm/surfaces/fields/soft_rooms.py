@@ -15,13 +15,14 @@ from ...kernel.record import Record
 from ...kernel.vector import ZERO, either
 from ..balls.joined_rooms import JoinedRooms
 from ..presence.joined import with_rooms
+from ..surface import LAWS
 from ..time_of_impact import flights
 from ..walls import Walls, all_walls
 from .members import SignedDistance
 from .one_wall import OneWall
 
 # What all parts of a union that is one wall have in common, besides their openings.
-IN_COMMON = "restitution", "friction", "rolling", "temperature", "accommodation", "laws", "motion", "present"
+IN_COMMON = *LAWS, "motion", "present"
 
 
 class RoomsTogether(Record):
