@@ -17,7 +17,7 @@ from ..common.frames import Frame
 from ..common.snapshot import NOTHING, Read, Snapshot
 from ..kernel.cache import kernels_compiled
 from ..kernel.compiling import Compilations
-from ..particles import Particles
+from ..particles import ARRAYS, Particles
 from ..scene import Scene
 from ..state import Absorbed, Multipliers
 from . import failures
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from ..files.background import Background
 
 _LOG = logging.getLogger("swarm")
-_OF_PARTICLES = "position", "velocity", "mass", "image", "radius", "spin"
 # Observables of so many frames are packed into arrays: as Python objects they take 3 kB a frame.
 _PACKED = 1024
 
@@ -180,7 +179,7 @@ def _measures_of(task: Task, session: Session) -> Measures:
 
 def start_of(task: Task) -> Snapshot:
     """The particles of a run at its start."""
-    arrays: dict[str, Any] = {name: getattr(task.particles, name) for name in _OF_PARTICLES}
+    arrays: dict[str, Any] = {name: getattr(task.particles, name) for name in ARRAYS}
     arrays["impacts"] = np.zeros(len(task.particles), np.int64)
     arrays["collisions"] = None if task.particles.radius is None else np.zeros(len(task.particles), np.int64)
     return _snapshot_of(task, arrays.get, 0.0)
