@@ -14,6 +14,7 @@ from .common.columns import read_columns, row_of
 from .common.validated import Count, Flag, Magnitude, NotNegativeCount, Part, Positive, Validated
 from .errors import SceneError
 from .files import paths
+from .files.sources import commands_for
 from .methods import Impact, Method
 from .particles import Particles
 from .placing.filling import fill
@@ -212,7 +213,11 @@ def text_of(path: Path) -> str:
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise SceneError(f"there is no file {path}; expected a scene file (.toml)") from None
-    except (OSError, ValueError) as error:  # the second: not UTF-8
+    except UnicodeDecodeError as error:
+        raise SceneError(
+            f"cannot read the scene file {path}: it is no text in UTF-8{commands_for(path, '.toml')}"
+        ) from error
+    except (OSError, ValueError) as error:
         raise SceneError(f"cannot read the scene file {path}: {error}") from error
 
 
