@@ -94,7 +94,7 @@ OBSERVABLES: dict[str, Observable] = {
     "angular_momentum": Observable("kg m2 s-1", "angular momentum about the origin, spins included", ("axis",)),
     "collision_rate": Observable("s-1", "pairs of balls that met in a second since the frame before", may_be_nan=True),
     "sliding_time": Observable("s", "time for which particles slid or rested, of all, since the start"),
-    "unconverged": Observable("1", "steps in which multipliers did not converge", every=True),
+    "unconverged": Observable("1", "steps in which multipliers, or friction of grains, did not converge", every=True),
     "sweeps": Observable("1", "sweeps of the loops of multipliers since the start"),
     "link_error": Observable("1", "largest relative error of the length of a link", joined="largest"),
     "part_impulse": Observable("N s", "normal impulse on the part of a union since the start", ("part",)),

@@ -68,6 +68,7 @@ class Matter(Record):
     openings: Any  # of all walls, or None
     counters: Any = None  # `counters.Counters`, or None
     holds: Any = None  # True where walls hold balls, else None
+    slips: float = 0.0  # the tolerance of friction
 
     @property
     def rubs(self):
@@ -177,12 +178,15 @@ def size_of(a):
 class ContactSweep(Record):
     """One of some sweeps: its number, 0 where it goes over all contacts, the share of changes, and what is solved.
 
+    `inverse` is 1/omega of successive over-relaxation, by which friction changes omega times as much as it would alone.
+
     Which contacts a later sweep for friction goes over is noted by their balls, `Touches.stirred`.
     """
 
     number: int
     share: float
     solved: float
+    inverse: float
 
 
 def is_due(sweep, stirred, i):

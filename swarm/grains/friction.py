@@ -114,7 +114,7 @@ def rub_wall(matter, law, wall, grains, touches, number, sweep):
         n, (_both, last) = _facing(own, way, radius, vector_at(rows, c, START), move)
         slip = across(v - last - radius * cross(w, n), n)
         before = across(vector_at(rows, c, DRAG), n)
-        new = rubbed(before, slip, ease * (1.0 + ROUNDNESS), law.friction * rows[c, PUSH])
+        new = rubbed(before, slip, sweep.inverse * (ease * (1.0 + ROUNDNESS)), law.friction * rows[c, PUSH])
         more, part = change_of(OfWall(rows, c), DRAG, new, share)
         set_vector(speed, i, AFTER, v + part * ease)
         set_vector(spin, i, AFTER, w - cross(n, part) * (ROUNDNESS * ease / radius))

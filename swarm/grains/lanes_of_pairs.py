@@ -374,9 +374,9 @@ def _if(is_due, change):
     return Vec(select(is_due, change.x, -0.0), select(is_due, change.y, -0.0), select(is_due, change.z, -0.0))
 
 
-def _rub(matter, rows, q, lane, is_due, begun, given, share):
+def _rub(matter, rows, q, lane, is_due, begun, given, sweep):
     """Improve the impulse and the friction of a contact of a group, if it is due; its error, and that of the first."""
-    way, push, part, off = _press(matter, rows, q, lane, is_due, begun, share)
+    way, push, part, off = _press(matter, rows, q, lane, is_due, begun, sweep.share)
     ease, over = rows[q + EASE, lane], 1.0 / square(way.along)
     arm = arm_of(way, rows[q + SIZE, lane], way.change, rows[q + NEARNESS, lane])
     turning = turning_in(begun, _TURNING - AFTER, _TURNING + FOUR - AFTER, AFTER, lane)
@@ -384,8 +384,8 @@ def _rub(matter, rows, q, lane, is_due, begun, given, share):
     slip = slip - (dot(slip, way.along) * over) * way.along
     old = vector_in(rows, q + DRAG, lane)
     before = old - (dot(old, way.along) * over) * way.along
-    new = rubbed(before, slip, ease * (1.0 + ROUNDNESS * square(arm)), matter.pairs.friction * push)
-    more, rub = changed(old, new, share)
+    new = rubbed(before, slip, sweep.inverse * (ease * (1.0 + ROUNDNESS * square(arm))), matter.pairs.friction * push)
+    more, rub = changed(old, new, sweep.share)
     set_vector_in(rows, q + DRAG, lane, old + _if(is_due, rub))
     give_impulse(rows, q, lane, given, _PART, part + rub)
     give_twist(rows, q, lane, given, _TWIST, cross(arm, rub))
@@ -422,7 +422,7 @@ def _rub_group(matter, grains, touches, group, arrays, sweep):
     unsolved = 0
     for k in over_lanes(lanes):
         lane, is_due = index(k), is_in(lanes, k)
-        off, pressed_off = _rub(matter, rows, q, lane, is_due, begun, given, sweep.share)
+        off, pressed_off = _rub(matter, rows, q, lane, is_due, begun, given, sweep)
         given[_OFF, lane] = off
         _note_worst(given, _WORST, lane, is_due, off)
         _note_worst(given, _PRESSED, lane, is_due, pressed_off)
@@ -492,7 +492,7 @@ def _over_groups(one, lanes_of, matter, grains, touches, sweep):
 @outlined
 def sweep_pairs(matter, grains, touches, share):
     """Improve the impulse of each pair; the largest change of one, relative to what moves there."""
-    worst, _pressed = _over_groups(_sweep_group, _all_lanes, matter, grains, touches, ContactSweep(0, share, 0.0))
+    worst, _pressed = _over_groups(_sweep_group, _all_lanes, matter, grains, touches, ContactSweep(0, share, 0.0, 1.0))
     return worst
 
 

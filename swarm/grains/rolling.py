@@ -40,7 +40,7 @@ def _ease(place, i):
     return ROUNDNESS * place[i, LIGHTNESS] / (place[i, RADIUS] * place[i, RADIUS])
 
 
-def _resist(contact, rolling, sizes, share):
+def _resist(contact, rolling, sizes, sweep):
     """The change of the angular impulse of a contact, and the error: of the rolling at the end of the step.
 
     `sizes` are the radius R and 1/I.
@@ -50,8 +50,8 @@ def _resist(contact, rolling, sizes, share):
         contact.set_vector(ROLL, ZERO)
         return -1.0 * roll, 0.0
     limit = rolling[1] * radius * contact.number(PUSH)
-    new = rubbed(across(roll, n), across(rolling[0], n), ease, limit)
-    more, part = change_of(contact, ROLL, new, share)
+    new = rubbed(across(roll, n), across(rolling[0], n), sweep.inverse * ease, limit)
+    more, part = change_of(contact, ROLL, new, sweep.share)
     return part, size_of(more * (1.0 / radius)) * contact.number(SCALE)
 
 
@@ -68,7 +68,7 @@ def roll_pairs(matter, grains, touches, sweep):
             w, u, one, two = vector_at(spin, i, AFTER), vector_at(spin, j, AFTER), _ease(place, i), _ease(place, j)
             radius = place[i, RADIUS] * place[j, RADIUS] / (place[i, RADIUS] + place[j, RADIUS])
             rolling = w - u, matter.pairs.rolling
-            part, off = _resist(contact, rolling, (radius, one + two), sweep.share)
+            part, off = _resist(contact, rolling, (radius, one + two), sweep)
             set_vector(spin, i, AFTER, w + part * one)
             set_vector(spin, j, AFTER, u - part * two)
             stir(sweep, touches.stirred, i, off)
@@ -124,7 +124,7 @@ def roll_wall(law, wall, grains, touches, number, sweep):
         i = index(touches.wall_ends[c])
         w, ease = vector_at(spin, i, AFTER), _ease(place, i)
         rolling = w - _spin_of(wall, grains, touches, c, i), law.rolling
-        part, off = _resist(OfWall(rows, c), rolling, (place[i, RADIUS], ease), sweep.share)
+        part, off = _resist(OfWall(rows, c), rolling, (place[i, RADIUS], ease), sweep)
         set_vector(spin, i, AFTER, w + part * ease)
         stir(sweep, touches.stirred, i, off)
         worst = worse(off, worst)
