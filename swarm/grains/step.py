@@ -14,26 +14,13 @@ from ..kernel.gravity import accelerated
 from ..kernel.jit import Array, outlined, select, wide_long_kernel
 from ..kernel.vector import ZERO, square
 from ..lanes.watching.log import is_full
+from . import grain_arrays as col
 from .at_walls import gather_at_wall, push_walls, sweep_wall
 from .booking import book_pairs, book_wall, count_members
 from .contacts import ContactSweep, find_more_pairs, find_pairs, foresee, travel_of, weight_of, worse
 from .exits import let_out, open_wall
 from .friction import book_rubbing, rub_wall, twist_wall
-from .grain_arrays import (
-    AFTER,
-    BEFORE,
-    DONE,
-    GIVEN,
-    LAST,
-    LIGHTNESS,
-    LOST,
-    SINCE,
-    SKIN,
-    TAKEN,
-    X,
-    set_vector,
-    vector_at,
-)
+from .grain_arrays import set_vector, vector_at
 from .held import let_go
 from .lanes_of_pairs import group_pairs, push_pairs, rub_pairs, sweep_pairs, twist_pairs
 from .logged import log_pairs, log_wall, note_pairs, note_wall
@@ -117,13 +104,13 @@ def _begin(matter, grains, touches, skin):
     place, speed, listed, farthest = grains.place, grains.speed, grains.listed, 0.0
     for k in range(place.shape[0]):
         i = index(k)
-        v = vector_at(speed, i, BEFORE)
-        set_vector(speed, i, AFTER, v + vector_at(grains.change, i, LAST))
-        set_vector(grains.change, i, GIVEN, ZERO)
+        v = vector_at(speed, i, col.BEFORE)
+        set_vector(speed, i, col.AFTER, v + vector_at(grains.change, i, col.LAST))
+        set_vector(grains.change, i, col.GIVEN, ZERO)
         if grains.spin is not None:
-            set_vector(grains.spin, i, AFTER, vector_at(grains.spin, i, BEFORE))
+            set_vector(grains.spin, i, col.AFTER, vector_at(grains.spin, i, col.BEFORE))
         foresee(matter, grains, touches.course, i)
-        farthest = worse(square(vector_at(place, i, X) + v * matter.h - vector_at(listed, i, X)), farthest)
+        farthest = worse(square(vector_at(place, i, col.X) + v * matter.h - vector_at(listed, i, col.X)), farthest)
     return farthest <= 0.25 * skin * skin
 
 
@@ -132,14 +119,14 @@ def _forget_spins(grains):
     """The spins at the end of a step without contacts."""
     if grains.spin is not None:
         for k in range(grains.spin.shape[0]):
-            set_vector(grains.spin, index(k), AFTER, vector_at(grains.spin, index(k), BEFORE))
+            set_vector(grains.spin, index(k), col.AFTER, vector_at(grains.spin, index(k), col.BEFORE))
 
 
 @outlined
 def _forget_given(grains):
     """No impulses of pairs are summed yet."""
     for k in range(grains.change.shape[0]):
-        set_vector(grains.change, index(k), GIVEN, ZERO)
+        set_vector(grains.change, index(k), col.GIVEN, ZERO)
 
 
 @outlined
@@ -148,11 +135,11 @@ def _fly(matter, grains):
     speed = grains.speed
     for k in range(speed.shape[0]):
         i = index(k)
-        v = vector_at(speed, i, BEFORE)
-        if matter.holds is None or grains.place[i, LIGHTNESS] > 0.0:
+        v = vector_at(speed, i, col.BEFORE)
+        if matter.holds is None or grains.place[i, col.LIGHTNESS] > 0.0:
             v = accelerated(matter.pull, v, matter.h)
-        set_vector(speed, i, AFTER, v + vector_at(grains.change, i, GIVEN))
-        set_vector(grains.change, i, GIVEN, ZERO)
+        set_vector(speed, i, col.AFTER, v + vector_at(grains.change, i, col.GIVEN))
+        set_vector(grains.change, i, col.GIVEN, ZERO)
 
 
 def _gather(matter, walls, world, travel):
@@ -334,15 +321,15 @@ def _arrive(matter, grains):
     place, speed, half = grains.place, grains.speed, 0.5 * matter.h
     for k in range(place.shape[0]):
         i = index(k)
-        v, r = vector_at(speed, i, AFTER), vector_at(place, i, X)
-        move = (vector_at(speed, i, BEFORE) + v) * half + vector_at(place, i, LOST)
+        v, r = vector_at(speed, i, col.AFTER), vector_at(place, i, col.X)
+        move = (vector_at(speed, i, col.BEFORE) + v) * half + vector_at(place, i, col.LOST)
         end = r + move
-        set_vector(place, i, X, end)
-        set_vector(place, i, LOST, move - (end - r))
-        set_vector(grains.change, i, LAST, v - vector_at(speed, i, BEFORE))
-        set_vector(speed, i, BEFORE, v)
+        set_vector(place, i, col.X, end)
+        set_vector(place, i, col.LOST, move - (end - r))
+        set_vector(grains.change, i, col.LAST, v - vector_at(speed, i, col.BEFORE))
+        set_vector(speed, i, col.BEFORE, v)
         if grains.spin is not None:
-            set_vector(grains.spin, i, BEFORE, vector_at(grains.spin, i, AFTER))
+            set_vector(grains.spin, i, col.BEFORE, vector_at(grains.spin, i, col.AFTER))
 
 
 def _note(matter, walls, world, time):
@@ -486,16 +473,16 @@ def march(matter, walls, world, clock, rule):
     needs an empty part: then call this again. INTERRUPTED after so many steps as the rule says; it goes on with the
     same bits.
     """
-    while clock[DONE] < rule.stop:
-        if clock[TAKEN] >= rule.halt[0]:
+    while clock[col.DONE] < rule.stop:
+        if clock[col.TAKEN] >= rule.halt[0]:
             return Status.INTERRUPTED.value
         if world.noting is not None and is_full(world.noting.log):
             return Status.LOG_FULL.value
-        left = (rule.span - clock[DONE]) * matter.h
+        left = (rule.span - clock[col.DONE]) * matter.h
         _let_go(matter, world, rule.moment - left)
         now = walls.during(left, left - matter.h)
-        listed = walls.at(left + clock[SINCE] * matter.h)
-        status = _step(matter, now, listed, world, clock[SKIN])
+        listed = walls.at(left + clock[col.SINCE] * matter.h)
+        status = _step(matter, now, listed, world, clock[col.SKIN])
         if status != Status.DONE.value:
             return status
         time = rule.moment - (left - matter.h)
@@ -508,9 +495,9 @@ def march(matter, walls, world, clock, rule):
         sent = Status.DONE.value if world.sender is None else _send_off(matter, now, world, time)
         if world.noting is not None:
             _log(matter, now, world, time)
-        clock[DONE] += 1.0
-        clock[TAKEN] += 1.0
-        clock[SINCE] += 1.0
+        clock[col.DONE] += 1.0
+        clock[col.TAKEN] += 1.0
+        clock[col.SINCE] += 1.0
         if world.sender is not None and sent == Status.SENT_WRONG:
             return sent
         if (matter.openings is not None and escaped > 0) or (world.sender is not None and sent != Status.DONE):
