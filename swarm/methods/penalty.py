@@ -33,8 +33,8 @@ class Penalty(fixed_step.SoftWalls):
         exponent: a >= 1 of the regularisation: 1 a linear spring, 1.5 Hertz's law.
         gradient: "composite", or "mean-value", which is the paper's general form, slow, and needs exponent > 1.
         friction_tolerance: of grains, from 1e-10 to 1: the change by which a sweep over all contacts ends the
-            solution of a step for friction, relative to what moves at a contact. Places are exact to 1e-5 of a radius
-            with 0.02, and to 1e-10 with 3e-8.
+            solution of a step for friction, relative to what moves at a contact. In 20 steps places in a pile are
+            exact to 5e-5 of a radius with 0.02, and to 1e-10 with 1e-8. A few grains are exact with any.
 
     Raises:
         SceneError: an argument is out of its range; a frame time is not a whole number of steps.
