@@ -123,8 +123,8 @@ def _slide(method, walls, gravity, wall, flight, energy, impulse, lane):
         # Walls do work.
         twice_energy = square(w) + 2.0 * potential(gravity, r)
     speed2, half_inverse = reflection.speed2_at(gravity, r, reflection.Energy(twice_energy, energy.half_inverse))
-    half_inverse = reflection.half_inverse_after(laws, speed2, w, half_inverse)
-    w = reflection.restore(gravity, w, speed2, half_inverse)
+    half_inverse = reflection.half_inverse_after(laws, speed2, half_inverse)
+    w = reflection.restore(w, speed2, half_inverse, reflection.may_lack_digits(laws, gravity))
     for i in range(count):
         taken = given[i] + 2.0 * touch.active[i]
         row, behind = walls.row(number[i]), walls.length()
