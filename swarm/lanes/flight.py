@@ -191,14 +191,25 @@ def _aim_at_moving(walls, gravity, lanes, live):
     for i in range(index(live)):
         lane = lanes.lane(i)
         aim.start(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
+    if aim.lacks_passages(walls):
+        for i in range(index(live)):
+            lane = lanes.lane(i)
+            aim.guess_by_levels(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
     for _round in range(aim.AIMS):
         for i in range(index(live)):
             aim.put_waves_at_guess(walls, course, i, lanes.lane(i).remaining, False)
         for i in range(index(live)):
             lane = lanes.lane(i)
-            aim.improve(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
+            aim.put_levels(walls, gravity, course, i, lane.r, lane.v, lane.remaining, False)
+        for i in range(index(live)):
+            aim.improve(course, i, lanes.lane(i).remaining)
     for i in range(index(live)):
         aim.put_waves_at_guess(walls, course, i, lanes.lane(i).remaining, True)
+    for i in range(index(live)):
+        lane = lanes.lane(i)
+        aim.put_levels(walls, gravity, course, i, lane.r, lane.v, lane.remaining, True)
+    for i in range(index(live)):
+        aim.put_way(course, i)
     for i in range(index(live)):
         lane = lanes.lane(i)
         aim.prove(walls, gravity, course, i, lane.r, lane.v, lane.remaining, False)
@@ -224,7 +235,9 @@ def _stride_open(walls, gravity, lanes, some):
     for k in range(index(count)):
         i, one = index(lanes.order[index(min(k, some - 1))]), Open(starts, k)
         lane = lanes.lane(i)
-        copy_lane(course, i, beside, k, aim.rows(walls))
+        for row in aim.open_rows(walls):
+            beside[row, k] = course[row, i]
+        beside[strides.TIME, k], beside[strides.MET, k] = 0.0, -1.0
         one.r, one.v, one.remaining = lane.r, lane.v, lane.remaining
     if aim.has_series(walls):
         for k in range(index(count)):

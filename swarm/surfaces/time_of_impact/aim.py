@@ -20,9 +20,11 @@ from .rising import ThirdDerivativeBound, flight_of, nearest_root
 from .safe import closed_hit, seen_by_walls
 from .strides import CLOSED, MET, OTHER, SPEED, TIME
 
-# Of a lane besides what its strides know: the guess, and of each wall until when its passage is free, or else the
-# polynomial at the start.
-_GUESS, WALLS, _OF_WALL = 5, 6, 3
+# Of a lane besides what its strides know: the guess, the way from there to the root, the wall and the parabola that this
+# is the root of, and what round-off at the guess is relative to. Then of each wall until when its passage is free, or else the
+# polynomial at the start; and after these its level at the guess.
+_GUESS, _WAY, _WALL, _NEAREST, _COORDINATES, WALLS = 5, 6, 7, 8, 11, 12
+_AT_GUESS, _OF_WALL = 3, 7
 # After the walls are the sine and the versine of each angle at the guess, of so many a wall at most.
 _OF_WAVE, _WAVES = 2, 3
 # Improvements of the guess before the last.
@@ -40,8 +42,8 @@ def start(walls, gravity, course, lane, r, v, remaining):
     known = _known(walls, gravity, speed, r, v, remaining, 0.0)
     for _number, one in known:
         way, level = one.seen.drive.passage(one.body, r, v, remaining), one.level
-        mine = level.own_rise() if way is None else way.hits
-        guess = select(mine < guess, mine, guess)
+        if way is not None:
+            guess = select(way.hits < guess, way.hits, guess)
         # A wall without others is met or not: until when it is not met does not matter.
         free = () if way is None else (way.free() if len(known) > 1 else select(way.once, math.inf, 0.0),)
         starts = (*starts, free or (level[0], level[1], level[2]))
@@ -49,6 +51,22 @@ def start(walls, gravity, course, lane, r, v, remaining):
     for k, kept in enumerate(starts):
         for i, number in enumerate(kept):
             course[WALLS + k * _OF_WALL + i, lane] = number
+
+
+def guess_by_levels(walls, gravity, course, lane, r, v, remaining):
+    """The guess of a lane, if one of its levels without a passage rises sooner by its parabola at the start."""
+    guess = course[_GUESS, lane]
+    for k, (_number, one) in enumerate(_known(walls, gravity, course[SPEED, lane], r, v, remaining, 0.0)):
+        if one.seen.drive.passage(one.body, r, v, remaining) is None:
+            rise = _at_start(one.level, course, k, lane).own_rise()
+            guess = select(rise < guess, rise, guess)
+    course[_GUESS, lane] = guess
+
+
+def _at_start(level, course, k, lane):
+    """The polynomial of wall k at the start of a lane."""
+    at = WALLS + k * _OF_WALL
+    return type(level)(*(course[at + i, lane] for i in range(_AT_GUESS)), *level[_AT_GUESS:])
 
 
 def start_series(walls, gravity, course, lane, r, v, remaining):
@@ -112,16 +130,46 @@ def _known_drives(walls):
     return drives if count <= len(walls.each) * _WAVES else ()
 
 
-def improve(walls, gravity, course, lane, r, v, remaining):
-    """A guess that is nearer to the hit."""
+def put_levels(walls, gravity, course, lane, r, v, remaining, is_last):
+    """The levels at the guess of a lane: the one that rises next to it, and before the proof all of them.
+
+    In a loop without a root or a quotient: what waits for these leaves no room for the next lanes.
+    """
     guess = course[_GUESS, lane]
     known = _known(with_waves(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, guess)
-    closed = course[CLOSED, lane]
+    c, b, a, wall = _nearest_rise(known)
+    course[_NEAREST, lane], course[_NEAREST + 1, lane], course[_NEAREST + 2, lane] = c, b, a
+    course[_WALL, lane] = wall
+    if not is_last:
+        return
+    for k, (_number, one) in enumerate(known):
+        course[_COORDINATES, lane] = one.seen.coordinates
+        for i in range(one.level.KEPT):
+            course[WALLS + k * _OF_WALL + _AT_GUESS + i, lane] = one.level[i]
+
+
+def put_way(course, lane):
+    """How far ahead of the guess of a lane, or back, the nearest of its levels rises."""
+    course[_WAY, lane] = nearest_root(*(course[_NEAREST + i, lane] for i in range(3)))
+
+
+def improve(course, lane, remaining):
+    """A guess that is nearer to the hit."""
+    guess, closed = course[_GUESS, lane], course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining)
-    way, _wall = _nearest_root(known)
-    after = guess + way
+    after = guess + nearest_root(*(course[_NEAREST + i, lane] for i in range(3)))
     after = select(after < longest, after, longest)
     course[_GUESS, lane] = select((guess > 0.0) & (after > 0.0), after, guess)
+
+
+def _with_levels(known, course, lane):
+    """The same with the levels that were put for a lane."""
+    found: tuple[Any, ...] = ()
+    for k, (number, one) in enumerate(known):
+        at, level = WALLS + k * _OF_WALL + _AT_GUESS, one.level
+        kept = type(level)(*(course[at + i, lane] for i in range(level.KEPT)), *level[level.KEPT :])
+        found = (*found, (number, one._replace(level=kept)))
+    return found
 
 
 def prove(walls, gravity, course, lane, r, v, remaining, by_series):
@@ -129,7 +177,8 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
     guess, closed = course[_GUESS, lane], course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining)
     known = _known(with_waves(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, guess)
-    way, wall = _nearest_root(known)
+    known = _with_levels(known, course, lane)
+    way, wall = course[_WAY, lane], course[_WALL, lane]
     meets = guess + way < longest
     way = select(meets, way, longest - guess)
     time = select(meets, guess + way, longest)
@@ -139,7 +188,7 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
         at, end = WALLS + k * _OF_WALL, level.moved(way, mine)
         sixth = one.third(time + far) * (1.0 / 6.0)
         # What is said of the end is said by the parabola at the guess.
-        near = sixth * far * far * far <= EPSILON * one.seen.coordinates * level.steepness
+        near = sixth * far * far * far <= EPSILON * course[_COORDINATES, lane] * level.steepness
         passage = one.seen.drive.passage(one.body, r, v, remaining)
         if passage is not None and not by_series:
             # A level that may rise twice is left to the series: one flight in a hundred was proven by its end alone.
@@ -152,7 +201,7 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
                 across = (passage.enters < passage.leaves) & (passage.leaves > 0.0) & (passage.enters < time)
                 ahead, since = select(across, passage.enters, ahead), select(across, passage.leaves, since)
                 ahead, since = select(ahead > 0.0, ahead, 0.0), select(since < time, since, time)
-            start = type(level)(*(course[at + i, lane] for i in range(3)), *level[3:])
+            start = _at_start(level, course, k, lane)
             proven = proven & near & start.is_below(1.0, sixth, ahead, True)
             proven = proven & end.is_below(-1.0, sixth, time - since, mine)
     for _at, rate in _waves(walls):
@@ -160,6 +209,15 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
     course[TIME, lane] = select(proven, time, 0.0)
     course[MET, lane] = select(proven & meets, wall, -1.0)
     _carry_waves(walls, course, lane, way, proven & meets)
+
+
+def lacks_passages(walls):
+    """Whether some walls have no passage."""
+    found = False
+    for wall in walls.each:
+        if isinstance(wall, Moving) and wall.accelerates and not (wall.drive.only_swings() and wall.body.has_core):
+            found = True
+    return found
 
 
 def has_series(walls):
@@ -173,9 +231,18 @@ def has_series(walls):
 
 def rows(walls):
     """How many rows of the course of a lane are used."""
-    drives = _known_drives(walls)
-    count = sum(len(drive.rates()) for drive in drives)
-    return _first_wave(walls) + count * _OF_WAVE
+    return _first_wave(walls) + len(_waves(walls)) * _OF_WAVE
+
+
+def open_rows(walls):
+    """Those that a lane without a proven hit needs: for a stride, and for the proof by series."""
+    if not has_series(walls):
+        return CLOSED, SPEED
+    levels = tuple(
+        WALLS + k * _OF_WALL + i for k, _wall in enumerate(walls.each) for i in range(_AT_GUESS, _OF_WALL)
+    )
+    waves = tuple(at + i for at, _rate in _waves(walls) for i in range(_OF_WAVE))
+    return CLOSED, SPEED, _GUESS, _WAY, _WALL, _COORDINATES, *levels, *waves
 
 
 def is_open(course, lane, remaining):
@@ -192,8 +259,8 @@ def _known(walls, gravity, speed, r, v, remaining, t):
     )
 
 
-def _nearest_root(known):
-    """How far ahead, or back, the first of the parabolas rises that are next to 0 by their slopes, and its wall."""
+def _nearest_rise(known):
+    """The first of the parabolas that rise next to here by their slopes, c + 2 b t + a t^2, and its wall."""
     c, b, a, wall = 0.0, 0.0, 0.0, -1.0
     for number, one in known:
         mine = one.level.ahead()
@@ -201,4 +268,4 @@ def _nearest_root(known):
         sooner = (mine.b > 0.0) & ((b <= 0.0) | (mine.c * b > c * mine.b))
         c, b, a = select(sooner, mine.c, c), select(sooner, mine.b, b), select(sooner, mine.a2, a)
         wall = select(sooner, number, wall)
-    return nearest_root(c, b, a), wall
+    return c, b, a, wall

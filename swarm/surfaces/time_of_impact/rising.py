@@ -215,6 +215,8 @@ class Level(Majorant):
     magnitude: float
     grows: Any = True
 
+    KEPT = 4  # how many of these, the first, depend on the place
+
     def third(self, bounds, within):
         """The bound of f''' within that time."""
         moved = self.steepness
@@ -259,6 +261,7 @@ class Between(Record):
     bend: float
     radius: float
 
+    KEPT = 3
     steepness = 1.0
 
     def third(self, bounds, within):
