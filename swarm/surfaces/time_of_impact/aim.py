@@ -202,8 +202,7 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
                 ahead, since = select(across, passage.enters, ahead), select(across, passage.leaves, since)
                 ahead, since = select(ahead > 0.0, ahead, 0.0), select(since < time, since, time)
             start = _at_start(level, course, k, lane)
-            proven = proven & near & start.is_below(1.0, sixth, ahead, True)
-            proven = proven & end.is_below(-1.0, sixth, time - since, mine)
+            proven = proven & near & start.is_below(sixth, ahead, True) & end.is_below(sixth, time - since, False)
     for _at, rate in _waves(walls):
         proven = proven & ((not meets) | (abs(rate) * far <= LITTLE_ANGLE))
     course[TIME, lane] = select(proven, time, 0.0)
