@@ -188,6 +188,9 @@ def _aim_at_moving(walls, gravity, lanes, live):
     its sine in one loop 1.1 to 1.2 of the time, a parabola and its root in a loop each 1.0 to 1.07.)
     """
     course = lanes.course
+    if aim.lacks_passages(walls):
+        for i in range(index(live)):
+            aim.put_waves(walls, course, i, lanes.lane(i).remaining)
     for i in range(index(live)):
         lane = lanes.lane(i)
         aim.start(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
@@ -210,6 +213,9 @@ def _aim_at_moving(walls, gravity, lanes, live):
         aim.put_levels(walls, gravity, course, i, lane.r, lane.v, lane.remaining, True)
     for i in range(index(live)):
         aim.put_way(course, i)
+    for i in range(index(live)):
+        lane = lanes.lane(i)
+        aim.put_ends(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
     for i in range(index(live)):
         lane = lanes.lane(i)
         aim.prove(walls, gravity, course, i, lane.r, lane.v, lane.remaining, False)

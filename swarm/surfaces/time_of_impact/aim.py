@@ -24,7 +24,7 @@ from .strides import CLOSED, MET, OTHER, SPEED, TIME
 # is the root of, and what round-off at the guess is relative to. Then of each wall until when its passage is free, or else the
 # polynomial at the start; and after these its level at the guess.
 _GUESS, _WAY, _WALL, _NEAREST, _COORDINATES, WALLS = 5, 6, 7, 8, 11, 12
-_AT_GUESS, _OF_WALL = 3, 7
+_AT_GUESS, _KEPT, _SIXTH, _OF_WALL = 3, 4, 3, 7
 # After the walls are the sine and the versine of each angle at the guess, of so many a wall at most.
 _OF_WAVE, _WAVES = 2, 3
 # Improvements of the guess before the last.
@@ -39,7 +39,8 @@ def start(walls, gravity, course, lane, r, v, remaining):
     longest = select(found.time < remaining, found.time, remaining)
     guess = math.inf
     starts: tuple[Any, ...] = ()
-    known = _known(walls, gravity, speed, r, v, remaining, 0.0)
+    here = with_waves(walls, course, lane) if lacks_passages(walls) else walls
+    known = _known(here, gravity, speed, r, v, remaining, 0.0)
     for _number, one in known:
         way, level = one.seen.drive.passage(one.body, r, v, remaining), one.level
         if way is not None:
@@ -58,15 +59,10 @@ def guess_by_levels(walls, gravity, course, lane, r, v, remaining):
     guess = course[_GUESS, lane]
     for k, (_number, one) in enumerate(_known(walls, gravity, course[SPEED, lane], r, v, remaining, 0.0)):
         if one.seen.drive.passage(one.body, r, v, remaining) is None:
-            rise = _at_start(one.level, course, k, lane).own_rise()
+            at = WALLS + k * _OF_WALL
+            rise = one.level.of_rows(tuple(course[at + i, lane] for i in range(_AT_GUESS))).own_rise()
             guess = select(rise < guess, rise, guess)
     course[_GUESS, lane] = guess
-
-
-def _at_start(level, course, k, lane):
-    """The polynomial of wall k at the start of a lane."""
-    at = WALLS + k * _OF_WALL
-    return type(level)(*(course[at + i, lane] for i in range(_AT_GUESS)), *level[_AT_GUESS:])
 
 
 def start_series(walls, gravity, course, lane, r, v, remaining):
@@ -144,7 +140,7 @@ def put_levels(walls, gravity, course, lane, r, v, remaining, is_last):
         return
     for k, (_number, one) in enumerate(known):
         course[_COORDINATES, lane] = one.seen.coordinates
-        for i in range(one.level.KEPT):
+        for i in range(_KEPT):
             course[WALLS + k * _OF_WALL + _AT_GUESS + i, lane] = one.level[i]
 
 
@@ -162,49 +158,56 @@ def improve(course, lane, remaining):
     course[_GUESS, lane] = select((guess > 0.0) & (after > 0.0), after, guess)
 
 
-def _with_levels(known, course, lane):
-    """The same with the levels that were put for a lane."""
-    found: tuple[Any, ...] = ()
+def _end(course, lane, remaining):
+    """(when the flight of a lane meets a wall or ends, how far that is from the guess, whether it meets one)."""
+    guess, way, closed = course[_GUESS, lane], course[_WAY, lane], course[CLOSED, lane]
+    longest = select(closed < remaining, closed, remaining)
+    time = guess + way
+    meets = time < longest
+    return select(meets, time, longest), select(meets, way, longest - guess), meets
+
+
+def put_ends(walls, gravity, course, lane, r, v, remaining):
+    """The levels at the end of the flight of a lane, and the bounds of f'''/6: infinite if it may be no root."""
+    time, way, meets = _end(course, lane, remaining)
+    far, coordinates = abs(way), course[_COORDINATES, lane]
+    known = _known(with_waves(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, course[_GUESS, lane])
     for k, (number, one) in enumerate(known):
-        at, level = WALLS + k * _OF_WALL + _AT_GUESS, one.level
-        kept = type(level)(*(course[at + i, lane] for i in range(level.KEPT)), *level[level.KEPT :])
-        found = (*found, (number, one._replace(level=kept)))
-    return found
+        at = WALLS + k * _OF_WALL + _AT_GUESS
+        level = one.level.of_rows(tuple(course[at + i, lane] for i in range(_KEPT)))
+        sixth = one._replace(level=level).third(time + far) * (1.0 / 6.0)
+        # What is said of the end is said by the parabola at the guess.
+        near = sixth * far * far * far <= EPSILON * coordinates * level.steepness
+        end = level.moved(way, meets & (course[_WALL, lane] == number))
+        course[at, lane], course[at + 1, lane], course[at + 2, lane] = end[0], end[1], end[2]
+        course[at + _SIXTH, lane] = select(near, sixth, math.inf)
 
 
 def prove(walls, gravity, course, lane, r, v, remaining, by_series):
     """The hit of a lane, if it is proven: for walls that only swing by their passages, or `by_series` as for others."""
-    guess, closed = course[_GUESS, lane], course[CLOSED, lane]
-    longest = select(closed < remaining, closed, remaining)
-    known = _known(with_waves(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, guess)
-    known = _with_levels(known, course, lane)
-    way, wall = course[_WAY, lane], course[_WALL, lane]
-    meets = guess + way < longest
-    way = select(meets, way, longest - guess)
-    time = select(meets, guess + way, longest)
-    far, proven = abs(way), (guess > 0.0) & (time > 0.0)
-    for k, (number, one) in enumerate(known):
-        mine, level = meets & (wall == number), one.level
-        at, end = WALLS + k * _OF_WALL, level.moved(way, mine)
-        sixth = one.third(time + far) * (1.0 / 6.0)
-        # What is said of the end is said by the parabola at the guess.
-        near = sixth * far * far * far <= EPSILON * course[_COORDINATES, lane] * level.steepness
+    time, way, meets = _end(course, lane, remaining)
+    wall, proven = course[_WALL, lane], (course[_GUESS, lane] > 0.0) & (time > 0.0)
+    for k, (number, one) in enumerate(_known(walls, gravity, course[SPEED, lane], r, v, remaining, 0.0)):
+        at = WALLS + k * _OF_WALL
+        end = one.level.of_rows(tuple(course[at + _AT_GUESS + i, lane] for i in range(_KEPT)))
+        sixth = course[at + _AT_GUESS + _SIXTH, lane]
         passage = one.seen.drive.passage(one.body, r, v, remaining)
         if passage is not None and not by_series:
             # A level that may rise twice is left to the series: one flight in a hundred was proven by its end alone.
             free = course[at, lane]
-            once = (free == math.inf) & end.is_admissible()
-            proven = proven & ((once & near) | ((not mine) & (time <= free) & (free < math.inf)))
+            once = (free == math.inf) & (sixth < math.inf) & end.is_admissible()
+            others = (not (meets & (wall == number))) & (time <= free) & (free < math.inf)
+            proven = proven & (once | others)
         else:
             ahead = since = 0.5 * time
             if passage is not None:
                 across = (passage.enters < passage.leaves) & (passage.leaves > 0.0) & (passage.enters < time)
                 ahead, since = select(across, passage.enters, ahead), select(across, passage.leaves, since)
                 ahead, since = select(ahead > 0.0, ahead, 0.0), select(since < time, since, time)
-            start = _at_start(level, course, k, lane)
-            proven = proven & near & start.is_below(sixth, ahead, True) & end.is_below(sixth, time - since, False)
+            start = one.level.of_rows(tuple(course[at + i, lane] for i in range(_AT_GUESS)))
+            proven = proven & start.is_below(sixth, ahead, True) & end.is_below(sixth, time - since, False)
     for _at, rate in _waves(walls):
-        proven = proven & ((not meets) | (abs(rate) * far <= LITTLE_ANGLE))
+        proven = proven & ((not meets) | (abs(rate * way) <= LITTLE_ANGLE))
     course[TIME, lane] = select(proven, time, 0.0)
     course[MET, lane] = select(proven & meets, wall, -1.0)
     _carry_waves(walls, course, lane, way, proven & meets)
@@ -241,7 +244,7 @@ def open_rows(walls):
         WALLS + k * _OF_WALL + i for k, _wall in enumerate(walls.each) for i in range(_AT_GUESS, _OF_WALL)
     )
     waves = tuple(at + i for at, _rate in _waves(walls) for i in range(_OF_WAVE))
-    return CLOSED, SPEED, _GUESS, _WAY, _WALL, _COORDINATES, *levels, *waves
+    return CLOSED, SPEED, _GUESS, _WAY, _WALL, *levels, *waves
 
 
 def is_open(course, lane, remaining):

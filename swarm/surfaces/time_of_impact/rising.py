@@ -215,7 +215,9 @@ class Level(Majorant):
     magnitude: float
     grows: Any = True
 
-    KEPT = 4  # how many of these, the first, depend on the place
+    def of_rows(self, given):
+        """The level with the first of its numbers given: three, or four."""
+        return Level(*given, *self[len(given) :])
 
     def third(self, bounds, within):
         """The bound of f''' within that time."""
@@ -262,7 +264,9 @@ class Between(Record):
     bend: float
     radius: float
 
-    KEPT = 3
+    def of_rows(self, given):
+        """As of a `Level`."""
+        return self._replace(place=given[0], half=given[1], bend=given[2])
     steepness = 1.0
 
     def third(self, bounds, within):
