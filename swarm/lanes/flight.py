@@ -190,7 +190,9 @@ def _aim_at_moving(walls, gravity, lanes, live):
     course = lanes.course
     if aim.lacks_passages(walls):
         for i in range(index(live)):
-            aim.put_waves(walls, course, i, lanes.lane(i).remaining)
+            aim.put_angles(walls, course, i, lanes.lane(i).remaining)
+        for i in range(index(live)):
+            aim.put_waves(walls, course, i)
     for i in range(index(live)):
         lane = lanes.lane(i)
         aim.start(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
@@ -200,14 +202,18 @@ def _aim_at_moving(walls, gravity, lanes, live):
             aim.guess_by_levels(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
     for _round in range(aim.AIMS):
         for i in range(index(live)):
-            aim.put_waves_at_guess(walls, course, i, lanes.lane(i).remaining, False)
+            aim.put_angles_at_guess(walls, course, i, lanes.lane(i).remaining)
+        for i in range(index(live)):
+            aim.put_waves(walls, course, i, True)
         for i in range(index(live)):
             lane = lanes.lane(i)
             aim.put_levels(walls, gravity, course, i, lane.r, lane.v, lane.remaining, False)
         for i in range(index(live)):
             aim.improve(course, i, lanes.lane(i).remaining)
     for i in range(index(live)):
-        aim.put_waves_at_guess(walls, course, i, lanes.lane(i).remaining, True)
+        aim.put_angles_at_guess(walls, course, i, lanes.lane(i).remaining)
+    for i in range(index(live)):
+        aim.put_waves(walls, course, i)
     for i in range(index(live)):
         lane = lanes.lane(i)
         aim.put_levels(walls, gravity, course, i, lane.r, lane.v, lane.remaining, True)
@@ -257,7 +263,9 @@ def _stride_open(walls, gravity, lanes, some):
         strides.stride(walls, gravity, beside, k, one.r, one.v, one.remaining, True)
     # A contact takes them from its course, where a proof has left those of its hit.
     for k in range(index(count)):
-        aim.put_waves(walls, beside, k, Open(starts, k).remaining - beside[strides.TIME, k])
+        aim.put_angles(walls, beside, k, Open(starts, k).remaining - beside[strides.TIME, k])
+    for k in range(index(count)):
+        aim.put_waves(walls, beside, k)
     for k in range(index(some)):
         i = index(lanes.order[k])
         copy_lane(beside, k, course, i, strides.FOUND)

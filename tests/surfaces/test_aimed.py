@@ -45,11 +45,19 @@ def aimed_hit(walls, flight):
     """The hit that is proven, or None."""
     course = course_of(walls)
     with np.errstate(all="ignore"):
+        aim.put_angles(walls, course, 0, flight[2])
+        aim.put_waves(walls, course, 0)
         aim.start(walls, None, course, 0, *flight)
-        for _round in range(aim.AIMS):
-            aim.put_waves_at_guess(walls, course, 0, flight[2], False)
-            aim.improve(walls, None, course, 0, *flight)
-        aim.put_waves_at_guess(walls, course, 0, flight[2], True)
+        if aim.lacks_passages(walls):
+            aim.guess_by_levels(walls, None, course, 0, *flight)
+        for left in range(aim.AIMS, -1, -1):
+            aim.put_angles_at_guess(walls, course, 0, flight[2])
+            aim.put_waves(walls, course, 0, left > 0)
+            aim.put_levels(walls, None, course, 0, *flight, left == 0)
+            if left > 0:
+                aim.improve(course, 0, flight[2])
+        aim.put_way(course, 0)
+        aim.put_ends(walls, None, course, 0, *flight)
         aim.prove(walls, None, course, 0, *flight, False)
         if aim.is_open(course, 0, flight[2]) and aim.has_series(walls):
             aim.start_series(walls, None, course, 0, *flight)

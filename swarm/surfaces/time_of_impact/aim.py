@@ -11,6 +11,7 @@ proven is left to the safe steps of strides.py, which begin anew.
 import math
 from typing import Any
 
+from ...kernel.elementary import nearly_sine_and_versine_of, reduced, sine_and_versine_of
 from ...kernel.jit import select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import norm
@@ -72,21 +73,22 @@ def start_series(walls, gravity, course, lane, r, v, remaining):
             course[WALLS + k * _OF_WALL + i, lane] = one.level[i]
 
 
-def put_waves_at_guess(walls, course, lane, remaining, is_last):
-    """The waves of all motions at the guess of a lane.
-
-    Before the last improvement an error of a guess leaves its third power.
-    """
-    put_waves(walls, course, lane, remaining - course[_GUESS, lane], not is_last)
+def put_angles_at_guess(walls, course, lane, remaining):
+    """The `reduced` angles of all motions at the guess of a lane."""
+    put_angles(walls, course, lane, remaining - course[_GUESS, lane])
 
 
-def put_waves(walls, course, lane, left, nearly=False):
-    """The waves of all motions with so much of the frame left, in a loop of its own: two short loops are sooner."""
-    at = _first_wave(walls)
-    for drive in _known_drives(walls):
-        for wave in drive.nearly_waves_at(left) if nearly else drive.waves_at(left):
-            course[at, lane], course[at + 1, lane] = wave
-            at += _OF_WAVE
+def put_angles(walls, course, lane, left):
+    """The `reduced` angles of all motions with so much of the frame left."""
+    for at, rate in _waves(walls):
+        course[at, lane], course[at + 1, lane] = reduced(rate * -left)
+
+
+def put_waves(walls, course, lane, is_guess=False):
+    """Their waves; at a guess that is improved, of which an error leaves its third power, to some 1e-7."""
+    of = nearly_sine_and_versine_of if is_guess else sine_and_versine_of
+    for at, _rate in _waves(walls):
+        course[at, lane], course[at + 1, lane] = of(course[at, lane], course[at + 1, lane])
 
 
 def with_waves(walls, course, lane):
