@@ -225,6 +225,8 @@ def _aim_at_moving(walls, gravity, lanes, live):
     for i in range(index(live)):
         lane = lanes.lane(i)
         aim.prove(walls, gravity, course, i, lane.r, lane.v, lane.remaining, False)
+    for i in range(index(live)):
+        aim.carry_waves(walls, course, i)
     return _mark_open(lanes, live)
 
 

@@ -102,11 +102,11 @@ def copy_waves(walls, source, i, target, k):
         target[at, k], target[at + 1, k] = source[at, i], source[at + 1, i]
 
 
-def _carry_waves(walls, course, lane, way, proven):
-    """The waves at the guess of a lane so much later, or sooner, if its hit is proven there."""
+def carry_waves(walls, course, lane):
+    """The waves at the guess of a lane, at its hit if that is proven."""
+    way = select(course[MET, lane] >= 0.0, course[_WAY, lane], 0.0)
     for at, rate in _waves(walls):
-        before = Wave(course[at, lane], course[at + 1, lane])
-        course[at, lane], course[at + 1, lane] = select(proven, before.later(rate * way), before)
+        course[at, lane], course[at + 1, lane] = Wave(course[at, lane], course[at + 1, lane]).later(rate * way)
 
 
 def _waves(walls):
@@ -212,7 +212,6 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
         proven = proven & ((not meets) | (abs(rate * way) <= LITTLE_ANGLE))
     course[TIME, lane] = select(proven, time, 0.0)
     course[MET, lane] = select(proven & meets, wall, -1.0)
-    _carry_waves(walls, course, lane, way, proven & meets)
 
 
 def lacks_passages(walls):
