@@ -219,7 +219,7 @@ def _make_contacts(method, walls, gravity, share, lanes, picked, live):
         for i in range(index(live)):
             aim.put_angles(walls, lanes.course, i, lanes.lane(i).remaining)
         for i in range(index(live)):
-            aim.put_waves(walls, lanes.course, i)
+            aim.put_waves(walls, lanes.course, i, False)
     for i in range(index(live)):
         lane, found = lanes.given(method, i), solution(method, lanes, i)
         here = lanes.faced(of_lane(walls, picked, i), i)

@@ -46,7 +46,7 @@ def aimed_hit(walls, flight):
     course = course_of(walls)
     with np.errstate(all="ignore"):
         aim.put_angles(walls, course, 0, flight[2])
-        aim.put_waves(walls, course, 0)
+        aim.put_waves(walls, course, 0, False)
         aim.start(walls, None, course, 0, *flight)
         if aim.lacks_passages(walls):
             aim.guess_by_levels(walls, None, course, 0, *flight)

@@ -21,9 +21,10 @@ from .rising import ThirdDerivativeBound, flight_of, nearest_root
 from .safe import closed_hit, seen_by_walls
 from .strides import CLOSED, MET, OTHER, SPEED, TIME
 
-# Of a lane besides what its strides know: the guess, the way from there to the root, the wall and the parabola that this
-# is the root of, and what round-off at the guess is relative to. Then of each wall until when its passage is free, or else the
-# polynomial at the start; and after these its level at the guess.
+# Of a lane besides what its strides know: the guess, the way from there to the nearest root, the wall and the parabola
+# that have it, and what round-off at the guess is relative to. Then of each wall until when its passage is free, or else
+# the polynomial at the start; and after these its level at the guess and then at the end, where the bound of f'''/6 takes
+# the place of the steepness.
 _GUESS, _WAY, _WALL, _NEAREST, _COORDINATES, WALLS = 5, 6, 7, 8, 11, 12
 _AT_GUESS, _KEPT, _SIXTH, _OF_WALL = 3, 4, 3, 7
 # After the walls are the sine and the versine of each angle at the guess, of so many a wall at most.
@@ -84,7 +85,7 @@ def put_angles(walls, course, lane, left):
         course[at, lane], course[at + 1, lane] = reduced(rate * -left)
 
 
-def put_waves(walls, course, lane, is_guess=False):
+def put_waves(walls, course, lane, is_guess):
     """Their waves; at a guess that is improved, of which an error leaves its third power, to some 1e-7."""
     of = nearly_sine_and_versine_of if is_guess else sine_and_versine_of
     for at, _rate in _waves(walls):
@@ -241,9 +242,7 @@ def open_rows(walls):
     """Those that a lane without a proven hit needs: for a stride, and for the proof by series."""
     if not has_series(walls):
         return CLOSED, SPEED
-    levels = tuple(
-        WALLS + k * _OF_WALL + i for k, _wall in enumerate(walls.each) for i in range(_AT_GUESS, _OF_WALL)
-    )
+    levels = tuple(WALLS + k * _OF_WALL + i for k, _wall in enumerate(walls.each) for i in range(_AT_GUESS, _OF_WALL))
     waves = tuple(at + i for at, _rate in _waves(walls) for i in range(_OF_WAVE))
     return CLOSED, SPEED, _GUESS, _WAY, _WALL, *levels, *waves
 

@@ -267,6 +267,7 @@ class Between(Record):
     def of_rows(self, given):
         """As of a `Level`."""
         return self._replace(place=given[0], half=given[1], bend=given[2])
+
     steepness = 1.0
 
     def third(self, bounds, within):
