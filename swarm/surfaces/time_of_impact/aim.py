@@ -22,9 +22,9 @@ from .safe import closed_hit, seen_by_walls
 from .strides import CLOSED, MET, OTHER, SPEED, TIME
 
 # Of a lane besides what its strides know: the guess, the way from there to the nearest root, the wall and the parabola
-# that have it, and what round-off at the guess is relative to. Then of each wall until when its passage is free, or else
-# the polynomial at the start; and after these its level at the guess and then at the end, where the bound of f'''/6 takes
-# the place of the steepness.
+# that have it, and what round-off at the guess is relative to. Then of each wall until when its passage is free, or
+# else the polynomial at the start; and after these its level at the guess, and then that at the end, of which the bound
+# of f'''/6 takes the place of the steepness.
 _GUESS, _WAY, _WALL, _NEAREST, _COORDINATES, WALLS = 5, 6, 7, 8, 11, 12
 _AT_GUESS, _KEPT, _SIXTH, _OF_WALL = 3, 4, 3, 7
 # After the walls are the sine and the versine of each angle at the guess, of so many a wall at most.
@@ -194,11 +194,12 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
         at = WALLS + k * _OF_WALL
         end = one.level.of_rows(tuple(course[at + _AT_GUESS + i, lane] for i in range(_KEPT)))
         sixth = course[at + _AT_GUESS + _SIXTH, lane]
+        near = sixth < math.inf
         passage = one.seen.drive.passage(one.body, r, v, remaining)
         if passage is not None and not by_series:
             # A level that may rise twice is left to the series: one flight in a hundred was proven by its end alone.
             free = course[at, lane]
-            once = (free == math.inf) & (sixth < math.inf) & end.is_admissible()
+            once = (free == math.inf) & near & end.is_admissible()
             others = (not (meets & (wall == number))) & (time <= free) & (free < math.inf)
             proven = proven & (once | others)
         else:
@@ -208,7 +209,7 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
                 ahead, since = select(across, passage.enters, ahead), select(across, passage.leaves, since)
                 ahead, since = select(ahead > 0.0, ahead, 0.0), select(since < time, since, time)
             start = one.level.of_rows(tuple(course[at + i, lane] for i in range(_AT_GUESS)))
-            proven = proven & start.is_below(sixth, ahead, True) & end.is_below(sixth, time - since, False)
+            proven = proven & near & start.is_below(sixth, ahead, True) & end.is_below(sixth, time - since, False)
     for _at, rate in _waves(walls):
         proven = proven & ((not meets) | (abs(rate * way) <= LITTLE_ANGLE))
     course[TIME, lane] = select(proven, time, 0.0)
