@@ -218,6 +218,9 @@ class ImpactLog(Stored):
             outline `member` is that of the end. A contact has no row that lasts at the end of the run, or that the wall
             leaves, by an opening or as it is `present` no more.
 
+            A contact of a point with a soft wall has its row where it ends too, with the whole impulse of that wall.
+            One that laws do not end, as the wall leaves or another wall absorbs the point, has the same velocity twice.
+
             In a run with counters a crossing is a row too, with an impulse of 0 and the velocity at the crossing twice:
             `counter` is the place of the counter in `counters` and `sense` 0 out of its admissible side, 1 back, and
             both `surface` and `member` are -1. Of impacts `counter` and `sense` are -1.

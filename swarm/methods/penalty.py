@@ -52,8 +52,9 @@ class Penalty(fixed_step.SoftWalls):
     a step may go a twentieth of the shortest period.
 
     Laws of walls: `restitution`, `friction`, `temperature` and `laws` act on points where a contact ends. They make of
-    it what they make of an impact on a rigid wall, and what they take or give is booked. Friction acts on the whole
-    impulse of a contact; in a contact that gravity makes last it acts each time that the particle swings back.
+    it what they make of an impact on a rigid wall, and what they take or give is booked. In an edge they act on no more
+    speed than their wall has given, and what other walls have given besides stays. Friction acts on the whole impulse
+    of a contact; in a contact that gravity makes last it acts each time that the particle swings back.
 
     Openings: a step decides at its start whether the wall is open at the foot of the point on it. Doors are at whole
     steps. What a contact stores with a wall that opens, or goes, is in "dissipated_energy".
