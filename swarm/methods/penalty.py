@@ -57,7 +57,8 @@ class Penalty(fixed_step.SoftWalls):
     of a contact; in a contact that gravity makes last it acts each time that the particle swings back.
 
     Openings: a step decides at its start whether the wall is open at the foot of the point on it. Doors are at whole
-    steps. What a contact stores with a wall that opens, or goes, is in "dissipated_energy".
+    steps. What a contact stores with a wall that opens, or goes, is in "dissipated_energy"; so is what walls store of a
+    particle that another wall absorbs.
 
     Unions and foams: a `Union` of several rooms, or a foam, is one wall with the same laws for all of its parts. In a
     doorway nothing pushes, and behind the edge of one the nearer room does. A step that is longer than the wall

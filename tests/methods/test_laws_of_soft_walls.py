@@ -96,6 +96,17 @@ def test_points_are_absorbed_or_wait(name):
     assert waited / 5e-3 == pytest.approx(round(waited / 5e-3), abs=1e-6) or name == "cut"
 
 
+def test_what_another_wall_stores_of_a_point_that_is_absorbed_is_lost():
+    floor, side = swarm.Plane((0.0, 0.0, -1.0), 0.0, laws=[swarm.Absorb(1.0)]), swarm.Plane((1.0, 0.0, 0.0), 0.1)
+    scene, method = swarm.Scene([floor, side]), swarm.Penalty(1e-3, ALPHA)
+    end = ran(scene, swarm.Particles((0.0, 0.0, 0.1), (0.8, 0.0, -1.0)), method)
+    seen, inside = end.observables, end.particles.position[0, 0] - 0.1
+    assert inside > 5e-3
+    assert seen["contact_energy"][-1] == 0.0
+    assert seen["dissipated_energy"][-1] == pytest.approx(0.5 * ALPHA * inside**2, rel=1e-12)
+    assert max(balanced(seen), seen["energy_error"].max()) < 1e-14
+
+
 def test_what_slides_under_its_weight_is_rubbed():
     # v = v0 - mu g t, to rest at v0/(mu g), by contacts that last 2 pi/sqrt(alpha/m) each.
     floor = swarm.Plane((0.0, 0.0, -1.0), 0.0, friction=0.2)
