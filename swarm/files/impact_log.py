@@ -209,7 +209,8 @@ class ImpactLog(Stored):
             carries, and ways through openings, have no rows. A crossing is that of the centre of mass.
 
             Of particles with a radius a collision of two is a row too, of the one with the smaller number: `partner` is
-            the other one, -1 at a wall, `impulse` what each gives the other, and both `surface` and `member` are -1.
+            the other one, -1 at a wall, `impulse` what each gives the other along the line of their centres, and both
+            `surface` and `member` are -1.
 
             A contact of two grains, or of a grain with a wall, lasts, and has its row where it ends, as laws of walls
             act there: `time` is the end of the step, `velocity_before` is that at the start of the contact, `impulse`
