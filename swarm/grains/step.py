@@ -61,8 +61,8 @@ _SLOW, _MOST_RELAXED = 0.25, 1.7
 # exact whatever the tolerance is, and no sweep is added for a pile.
 _CHEAP = 128
 _MOST_SWEEPS = 1000
-# So many sweeps for each digit of friction; then it is given as it is, and so are dampers with changes that are no
-# larger than the second number.
+# So many sweeps for friction, and as many for each digit; then it is given as it is, and so are dampers with changes
+# that are no larger than the second number.
 _RUBS_A_DIGIT, _LAGGING = 200, 2e-6
 # Where so many sweeps have not brought the changes down to that part, only half as large a share of them is made. Those
 # for friction may be slow without going round in circles: with 20 of them 1000 grains that lie take 5 times as many.
@@ -256,7 +256,7 @@ def _solve_friction(matter, walls, world):
     before, worst, sweeps, slow, share, best, since, follows = math.inf, 1.0, 0, 0, 1.0, math.inf, 0, math.inf
     solved = matter.slips * (_ROLLED if matter.rolls else 1.0)
     cheap = _CHEAP // max(_contacts(walls, world.touches), 1)
-    stirring = _SOLVED if cheap > 0 else _STIRRING * matter.slips
+    stirring = _SOLVED if cheap > 1 else _STIRRING * matter.slips
     world.touches.stirred[:] = -1
     while sweeps < _RUBS_A_DIGIT * (1.0 - math.log10(solved)):
         number = sweeps if matter.rubs_everywhere else 0
@@ -272,7 +272,7 @@ def _solve_friction(matter, walls, world):
         before = worst
         share, best, since = _stalled((share, best, since), worst, _STALLED_RUBS)
     world.books.sweeps[0] += sweeps
-    return worst <= solved, follows
+    return worst <= max(solved, _NEARLY), follows
 
 
 @outlined
