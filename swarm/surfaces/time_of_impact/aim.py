@@ -25,8 +25,8 @@ from .strides import CLOSED, MET, OTHER, SPEED, TIME
 # that have it, and what round-off at the guess is relative to. Then of each wall until when its passage is free, or
 # else the polynomial at the start; and after these its level at the guess, and then that at the end, of which the bound
 # of f'''/6 takes the place of the steepness.
-_GUESS, _WAY, _WALL, _NEAREST, _COORDINATES, WALLS = 5, 6, 7, 8, 11, 12
-_AT_GUESS, _KEPT, _SIXTH, _OF_WALL = 3, 4, 3, 7
+GUESS, _WAY, _WALL, _NEAREST, _COORDINATES, WALLS = 5, 6, 7, 8, 11, 12
+_AT_END, _KEPT, _SIXTH, _OF_WALL = 3, 4, 3, 7
 # After the walls are the sine and the versine of each angle at the guess, of so many a wall at most.
 _OF_WAVE, _WAVES = 2, 3
 # Improvements of the guess before the last.
@@ -50,7 +50,7 @@ def start(walls, gravity, course, lane, r, v, remaining):
         # A wall without others is met or not: until when it is not met does not matter.
         free = () if way is None else (way.free() if len(known) > 1 else select(way.once, math.inf, 0.0),)
         starts = (*starts, free or (level[0], level[1], level[2]))
-    course[_GUESS, lane] = select(guess < longest, guess, longest)
+    course[GUESS, lane] = select(guess < longest, guess, longest)
     for k, kept in enumerate(starts):
         for i, number in enumerate(kept):
             course[WALLS + k * _OF_WALL + i, lane] = number
@@ -58,13 +58,13 @@ def start(walls, gravity, course, lane, r, v, remaining):
 
 def guess_by_levels(walls, gravity, course, lane, r, v, remaining):
     """The guess of a lane, if one of its levels without a passage rises sooner by its parabola at the start."""
-    guess = course[_GUESS, lane]
+    guess = course[GUESS, lane]
     for k, (_number, one) in enumerate(_known(walls, gravity, course[SPEED, lane], r, v, remaining, 0.0)):
         if one.seen.drive.passage(one.body, r, v, remaining) is None:
             at = WALLS + k * _OF_WALL
-            rise = one.level.of_rows(tuple(course[at + i, lane] for i in range(_AT_GUESS))).own_rise()
+            rise = one.level.of_rows(tuple(course[at + i, lane] for i in range(_AT_END))).own_rise()
             guess = select(rise < guess, rise, guess)
-    course[_GUESS, lane] = guess
+    course[GUESS, lane] = guess
 
 
 def start_series(walls, gravity, course, lane, r, v, remaining):
@@ -76,7 +76,7 @@ def start_series(walls, gravity, course, lane, r, v, remaining):
 
 def put_angles_at_guess(walls, course, lane, remaining):
     """The `reduced` angles of all motions at the guess of a lane."""
-    put_angles(walls, course, lane, remaining - course[_GUESS, lane])
+    put_angles(walls, course, lane, remaining - course[GUESS, lane])
 
 
 def put_angles(walls, course, lane, left):
@@ -134,7 +134,7 @@ def put_levels(walls, gravity, course, lane, r, v, remaining, is_last):
 
     In a loop without a root or a quotient: what waits for these leaves no room for the next lanes.
     """
-    guess = course[_GUESS, lane]
+    guess = course[GUESS, lane]
     known = _known(with_waves(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, guess)
     c, b, a, wall = _nearest_rise(known)
     course[_NEAREST, lane], course[_NEAREST + 1, lane], course[_NEAREST + 2, lane] = c, b, a
@@ -144,7 +144,7 @@ def put_levels(walls, gravity, course, lane, r, v, remaining, is_last):
     for k, (_number, one) in enumerate(known):
         course[_COORDINATES, lane] = one.seen.coordinates
         for i in range(_KEPT):
-            course[WALLS + k * _OF_WALL + _AT_GUESS + i, lane] = one.level[i]
+            course[WALLS + k * _OF_WALL + _AT_END + i, lane] = one.level[i]
 
 
 def put_way(course, lane):
@@ -154,16 +154,16 @@ def put_way(course, lane):
 
 def improve(course, lane, remaining):
     """A guess that is nearer to the hit."""
-    guess, closed = course[_GUESS, lane], course[CLOSED, lane]
+    guess, closed = course[GUESS, lane], course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining)
     after = guess + nearest_root(*(course[_NEAREST + i, lane] for i in range(3)))
     after = select(after < longest, after, longest)
-    course[_GUESS, lane] = select((guess > 0.0) & (after > 0.0), after, guess)
+    course[GUESS, lane] = select((guess > 0.0) & (after > 0.0), after, guess)
 
 
 def _end(course, lane, remaining):
     """(when the flight of a lane meets a wall or ends, how far that is from the guess, whether it meets one)."""
-    guess, way, closed = course[_GUESS, lane], course[_WAY, lane], course[CLOSED, lane]
+    guess, way, closed = course[GUESS, lane], course[_WAY, lane], course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining)
     time = guess + way
     meets = time < longest
@@ -174,9 +174,9 @@ def put_ends(walls, gravity, course, lane, r, v, remaining):
     """The levels at the end of the flight of a lane, and the bounds of f'''/6: infinite if it may be no root."""
     time, way, meets = _end(course, lane, remaining)
     far, coordinates = abs(way), course[_COORDINATES, lane]
-    known = _known(with_waves(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, course[_GUESS, lane])
+    known = _known(with_waves(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, course[GUESS, lane])
     for k, (number, one) in enumerate(known):
-        at = WALLS + k * _OF_WALL + _AT_GUESS
+        at = WALLS + k * _OF_WALL + _AT_END
         level = one.level.of_rows(tuple(course[at + i, lane] for i in range(_KEPT)))
         sixth = one._replace(level=level).third(time + far) * (1.0 / 6.0)
         # What is said of the end is said by the parabola at the guess.
@@ -189,11 +189,11 @@ def put_ends(walls, gravity, course, lane, r, v, remaining):
 def prove(walls, gravity, course, lane, r, v, remaining, by_series):
     """The hit of a lane, if it is proven: for walls that only swing by their passages, or `by_series` as for others."""
     time, way, meets = _end(course, lane, remaining)
-    wall, proven = course[_WALL, lane], (course[_GUESS, lane] > 0.0) & (time > 0.0)
+    wall, proven = course[_WALL, lane], (course[GUESS, lane] > 0.0) & (time > 0.0)
     for k, (number, one) in enumerate(_known(walls, gravity, course[SPEED, lane], r, v, remaining, 0.0)):
         at = WALLS + k * _OF_WALL
-        end = one.level.of_rows(tuple(course[at + _AT_GUESS + i, lane] for i in range(_KEPT)))
-        sixth = course[at + _AT_GUESS + _SIXTH, lane]
+        end = one.level.of_rows(tuple(course[at + _AT_END + i, lane] for i in range(_KEPT)))
+        sixth = course[at + _AT_END + _SIXTH, lane]
         near = sixth < math.inf
         passage = one.seen.drive.passage(one.body, r, v, remaining)
         if passage is not None and not by_series:
@@ -208,7 +208,7 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
                 across = (passage.enters < passage.leaves) & (passage.leaves > 0.0) & (passage.enters < time)
                 ahead, since = select(across, passage.enters, ahead), select(across, passage.leaves, since)
                 ahead, since = select(ahead > 0.0, ahead, 0.0), select(since < time, since, time)
-            start = one.level.of_rows(tuple(course[at + i, lane] for i in range(_AT_GUESS)))
+            start = one.level.of_rows(tuple(course[at + i, lane] for i in range(_AT_END)))
             proven = proven & near & start.is_below(sixth, ahead, True) & end.is_below(sixth, time - since, False)
     for _at, rate in _waves(walls):
         proven = proven & ((not meets) | (abs(rate * way) <= LITTLE_ANGLE))
@@ -243,9 +243,9 @@ def open_rows(walls):
     """Those that a lane without a proven hit needs: for a stride, and for the proof by series."""
     if not has_series(walls):
         return CLOSED, SPEED
-    levels = tuple(WALLS + k * _OF_WALL + i for k, _wall in enumerate(walls.each) for i in range(_AT_GUESS, _OF_WALL))
+    levels = tuple(WALLS + k * _OF_WALL + i for k, _wall in enumerate(walls.each) for i in range(_AT_END, _OF_WALL))
     waves = tuple(at + i for at, _rate in _waves(walls) for i in range(_OF_WAVE))
-    return CLOSED, SPEED, _GUESS, _WAY, _WALL, *levels, *waves
+    return CLOSED, SPEED, GUESS, _WAY, _WALL, *levels, *waves
 
 
 def is_open(course, lane, remaining):
