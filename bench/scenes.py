@@ -25,7 +25,14 @@ def _balls(count: int) -> list[Surface]:
 SPHERE = swarm.Sphere(0.5)
 ELLIPSOID = swarm.Ellipsoid((0.3, 0.3, 0.6))
 TURN = (0.9, 0.1, 0.2, 0.3)
-SINES = swarm.Formula("x**2/0.09 + y**2/0.09 + z**2/0.16 - 1 + 0.1*sin(10*x)*sin(10*y)")
+_SUM = "x**2/0.09 + y**2/0.09 + z**2/0.16 - 1 + 0.1*"
+# What the table calls the functions of a formula.
+FUNCTIONS = {
+    "sines": _SUM + "sin(10*x)*sin(10*y)",
+    "exp": _SUM + "exp(x*y)",
+    "log": _SUM + "log(1 + x**2 + y**2)",
+    "a power of 0.7": _SUM + "(1 + x**2)**0.7",
+}
 OF_DEGREE_6 = swarm.Formula("x**6/0.03 + y**6/0.03 + z**6/0.05 - 1")
 # name -> (surfaces, gravity, bar)
 SCENES: dict[str, tuple[list[Surface], tuple[float, float, float] | None, str]] = {
@@ -63,8 +70,19 @@ SCENES: dict[str, tuple[list[Surface], tuple[float, float, float] | None, str]] 
     ),
     "formula of the torus": ([swarm.Formula("(x**2 + y**2 + z**2 + 0.21)**2 - (x**2 + y**2)")], None, ""),
     "formula of the quadric": ([swarm.Formula("9*x**2 + 6*y**2 + 4*z**2 + 2*x*y - 1")], None, ""),
-    "formula with sines": ([SINES], None, ""),
-    "formula with sines, gravity": ([SINES], GRAVITY, ""),
+    **{
+        f"formula with {name}{', gravity' * (gravity is not None)}": ([swarm.Formula(text)], gravity, "")
+        for name, text in FUNCTIONS.items()
+        for gravity in (None, GRAVITY)
+    },
+    **{
+        f"solid with {name} in a box, gravity": (
+            [swarm.Box((0.9, 0.9, 0.9)), swarm.Formula(text, side="outside")],
+            GRAVITY,
+            "",
+        )
+        for name, text in FUNCTIONS.items()
+    },
     "formula of degree 6": ([OF_DEGREE_6], None, ""),
     "formula of degree 6, gravity": ([OF_DEGREE_6], GRAVITY, ""),
     "sphere, box, cylinder, capsule, torus, gravity": (

@@ -62,11 +62,7 @@ _FOLDERS = [
     ("output", "exports", "export exported gsd labelled obj ply spreadsheet vtkhdf walls xyz"),
     ("output", "files", "appended background checkpoint checksums driver impact_log impacts layout lock marks origin"),
     ("output", "files", "paths provenance replaced sources storage stored superblock trajectory writer"),
-    (
-        "output",
-        "pictures",
-        "balls colours drawing drawn eye film flat framed graphs plots raster scenery sentences",
-    ),
+    ("output", "pictures", "balls colours drawing drawn eye film flat framed graphs plots raster scenery sentences"),
     ("output", "pictures", "series shown_film silhouette speeds style triad"),
     ("output", "recording", "about instanced looks playback recorded recording=writer sheet sight viewer widget"),
     ("output", "pages", "page.html=html page.pictures=pictures page.reproduce=reproduce page.run=of_run"),

@@ -246,12 +246,7 @@ def add_up(values: NDArray[Any], n: int, sums: Floats) -> None:
 
 
 def summed(
-    sums: Floats,
-    owners: list[int],
-    booked: int,
-    has_heat: bool,
-    parts: PartsOfRows | None = None,
-    counters: int = 0,
+    sums: Floats, owners: list[int], booked: int, has_heat: bool, parts: PartsOfRows | None = None, counters: int = 0
 ) -> dict[str, Any]:
     """The observables that are sums over particles, from those of all chunks (quantities, chunks); NumPy adds pairwise.
 

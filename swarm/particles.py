@@ -12,6 +12,8 @@ from .common.columns import read_columns
 from .errors import SceneError
 from .state import Floats
 
+# The arrays of particles, in the order of the arguments that give them.
+ARRAYS = "position", "velocity", "mass", "image", "radius", "spin"
 _COLUMNS = ("x", "y", "z", "vx", "vy", "vz")
 _SPINS = ("wx", "wy", "wz")
 # What a frame of a trajectory that was exported as .csv has too; a start does not.
@@ -75,7 +77,7 @@ class Particles:
 
     def copy(self) -> "Particles":
         """The same particles, checked again, with arrays of their own."""
-        made = Particles(self.position, self.velocity, self.mass, self.image, self.radius, self.spin)
+        made = Particles(*(getattr(self, name) for name in ARRAYS))
         made._volume = self._volume
         return made
 
@@ -127,7 +129,7 @@ class Particles:
         The result may be empty.
         """
         there = ~np.isnan(self.position[0])
-        held = {name: getattr(self, name) for name in ("position", "velocity", "mass", "image", "radius", "spin")}
+        held = {name: getattr(self, name) for name in ARRAYS}
         some: dict[str, Any] = {name: None if rows is None else rows[..., there] for name, rows in held.items()}
         if there.any():
             return Particles(**some)

@@ -14,6 +14,7 @@ from .common.columns import read_columns, row_of
 from .common.validated import Count, Flag, Magnitude, NotNegativeCount, Part, Positive, Validated
 from .errors import SceneError
 from .files import paths
+from .files.sources import commands_for
 from .methods import Impact, Method
 from .particles import Particles
 from .placing.filling import fill
@@ -104,7 +105,7 @@ class Job:
     named: tuple[Path, ...] = ()
 
     def inputs(self) -> dict[str, Path | None]:
-        """What a file is -> the file, for all files that are read: none of them can be an output."""
+        """The files that are read, by what they are; none of them may be an output."""
         files: dict[str, Path | None] = {"scene file": self.path, "file of the start": self.start_file()}
         files |= {f"file that the scene reads, {one.name}": one for one in self.named}
         return files | {f"module {name} of --plugins": file for name, file in plugins.files().items()}
@@ -129,7 +130,7 @@ class Job:
         return None if name is None else self.path.parent / name
 
     def located(self, error: SceneError) -> SceneError:
-        """The error, with the row of the .csv file of its particle if it is about one."""
+        """The error; if it is about a particle of a .csv file, with the row of that."""
         file = self.start_file()
         if error.particle is None or file is None or file.suffix.lower() != ".csv":
             return error
@@ -212,7 +213,11 @@ def text_of(path: Path) -> str:
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise SceneError(f"there is no file {path}; expected a scene file (.toml)") from None
-    except (OSError, ValueError) as error:  # the second: not UTF-8
+    except UnicodeDecodeError as error:
+        raise SceneError(
+            f"cannot read the scene file {path}: it is no text in UTF-8{commands_for(path, '.toml')}"
+        ) from error
+    except (OSError, ValueError) as error:
         raise SceneError(f"cannot read the scene file {path}: {error}") from error
 
 
@@ -302,7 +307,7 @@ def _bodies_of(table: Any, where: str, path: Path) -> Any:
 
 
 def _named_files(document: dict[str, Any], path: Path) -> Iterator[Path]:
-    """The existing files that a text of the document names, except outputs; with a trajectory also its shards."""
+    """The existing files that texts of the document name, except outputs; of a trajectory its shards too."""
     run = document.get("run")
     read = {key: value for key, value in run.items() if key not in OUTPUTS} if isinstance(run, dict) else {}
     places: list[Any] = [{**document, "run": read}]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from conftest import compiled
 
-from swarm.kernel.elementary import nearly_sine_and_versine, sine_and_cosine, sine_and_versine
+from swarm.kernel.elementary import nearly_sine_and_versine_of, reduced, sine_and_cosine, sine_and_versine
 from swarm.surfaces.in_motion.drive import LITTLE_ANGLE, wave_of
 
 EPSILON = np.finfo(np.float64).eps
@@ -45,7 +45,7 @@ def test_beyond_the_error_is_that_of_the_rounded_angle():
 @pytest.mark.parametrize("angles", ANGLES.values(), ids=ANGLES)
 def test_for_a_guess_six_digits_do(angles):
     for angle in angles.tolist():
-        assert nearly_sine_and_versine(angle) == pytest.approx(sine_and_versine(angle), abs=1e-6)
+        assert nearly_sine_and_versine_of(*reduced(angle)) == pytest.approx(sine_and_versine(angle), abs=1e-6)
 
 
 @pytest.mark.parametrize("angles", ANGLES.values(), ids=ANGLES)

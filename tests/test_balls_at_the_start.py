@@ -49,6 +49,8 @@ def test_balls_that_are_apart_are_admitted(method):
          "pairs.contact_duration must be None with Penalty"),
         (swarm.Scene([BOX], pairs=swarm.Pairs()), swarm.Particles(np.zeros(3), np.zeros(3)), None, {},
          "pairs must be None where particles have no radius"),
+        (VESSEL, swarm.Particles(np.zeros(3), np.zeros(3)), swarm.Penalty(1e-3, 1e4, friction_tolerance=1e-3), {},
+         r"friction_tolerance must be left out without particles that have a radius, got 0.001; leave it out"),
         (swarm.Scene([BOX], plane="z"), balls(spin=[[0.0, 0.0], [0.0, 2.0], [1.0, 1.0]]), None, {},
          r"particles.spin\[1\] must be 0 in a scene with plane = .z., got 2 rad/s of particle 1: friction would"),
         (VESSEL, balls(), swarm.Impact(contact_step=1e-3), {}, "contact_step must be 0 where particles have a radius"),

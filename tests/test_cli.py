@@ -104,6 +104,9 @@ def test_what_cannot_be_read_is_one_line_and_exit_code_2(folder):
     whole = (folder / "scene.h5").read_bytes()
     (folder / "damaged.h5").write_bytes(whole[:100] + bytes(900) + whole[1000:])
     (folder / "empty.rrd").touch()
+    (folder / "zeros.h5").write_bytes(bytes(1000))
+    (folder / "runs").mkdir()
+    (folder / "runs" / "results.csv").touch()
     for words, message in (
         (["info", "damaged.h5"], "damaged.h5 is damaged: its structure: "),
         (["plot", "damaged.h5"], "damaged.h5 is damaged: its structure: "),
@@ -111,10 +114,21 @@ def test_what_cannot_be_read_is_one_line_and_exit_code_2(folder):
         (["run", "scene.toml", "-o", "damaged.h5", "--resume"], "damaged.h5 is damaged: its structure: "),
         (["info", "absent.h5"], "there is no file absent.h5; expected a trajectory or a log of impacts (.h5)"),
         (["info", "."], ". is a folder; expected a trajectory or a log of impacts (.h5)"),
-        (["plot", "scene.toml"], "scene.toml is not an HDF5 file"),
+        (
+            ["plot", "scene.toml"],
+            "scene.toml is not an HDF5 file, or its beginning is damaged; expected a trajectory or a log "
+            "of impacts, which are .h5 files; swarm check says what a scene file will do, and swarm run carries it out",
+        ),
+        (
+            ["plot", "zeros.h5"],
+            "zeros.h5 is not an HDF5 file, or its beginning is damaged; expected a trajectory or a log of "
+            "impacts, which are .h5 files\n",
+        ),
+        (["run", "scene.h5"], "cannot read the scene file scene.h5: it is no text in UTF-8; swarm info says what"),
         (["record", "absent.h5"], "there is no file absent.h5; expected a trajectory (.h5)"),
         (["view", "absent.rrd"], "there is no file absent.rrd; expected a recording (.rrd)"),
-        (["view", "scene.h5"], "scene.h5 is not a recording of swarm"),
+        (["view", "scene.h5"], "scene.h5 is not a recording of swarm; swarm info says what a trajectory holds"),
+        (["info", "runs"], "runs is a folder; expected a trajectory or a log of impacts (.h5); swarm report makes the"),
         (["info", "empty.rrd"], "empty.rrd is empty; expected a recording (.rrd)"),
     ):
         done = command(*words, cwd=folder)

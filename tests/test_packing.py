@@ -81,6 +81,10 @@ def test_walls_are_as_they_are_at_the_start():
     [
         ({"n": 100}, "pack needs two of n, radius and fraction, got n = 100"),
         ({}, "pack needs two of n, radius and fraction, got none"),
+        (
+            {"n": 10, "radius": 0.1, "fraction": 0.2},
+            r"pack needs two of n, radius and fraction, got all: n = 10, radius = 0.1, fraction = 0.2; leave one out",
+        ),
         ({"n": 10, "fraction": 0.62}, r"fraction must be at most 0.6, got 0.62$"),
         ({"n": 10, "fraction": 0.65}, "fraction must be at most 0.6, got 0.65; none at random fill more than 0.64"),
         ({"n": 10, "fraction": 0.75}, "got 0.75; no arrangement of equal ones fills more than 0.7405"),

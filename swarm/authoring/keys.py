@@ -77,7 +77,7 @@ _CHECKED: dict[Any, Any] = {
     checks.magnitude: lambda: NOT_NEGATIVE | {"maximum": checks.LARGEST},
     checks.positive_magnitude: lambda: {"type": "number", "exclusiveMinimum": 0, "maximum": checks.LARGEST},
     checks.bounded: lambda: {"type": "number", "minimum": -checks.LARGEST, "maximum": checks.LARGEST},
-    checks.part: lambda: PART,
+    checks.part: lambda least=0.0: PART | {"minimum": least},
     checks.count: lambda least=1: {"type": "integer", "minimum": least},
     checks.seed: lambda: {"type": "integer", "minimum": 0, "exclusiveMaximum": 2**64},
     checks.flag: lambda: {"type": "boolean"},

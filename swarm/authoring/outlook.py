@@ -260,8 +260,8 @@ def _about(seconds: float) -> str:
     """A time in a suitable unit, with the digits that an estimate has."""
     for size, unit in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 2.0 * size:
-            return f"{seconds / size:.2g} {unit}"
-    return f"{seconds:.1g} s" if seconds < 10.0 else f"{seconds:.0f} s"
+            return f"{float(f'{seconds / size:.2g}'):g} {unit}"
+    return f"{float(f'{seconds:.1g}') if seconds < 10.0 else round(seconds):g} s"
 
 
 def _loads(task: Task) -> list[Workload]:

@@ -5,12 +5,11 @@ from typing import Any
 from ..fleet.plan import COMBINE, MAKERS, WAYS
 from ..scene_file import SWEEP
 from ..surfaces import ALL_FIELDS, ALL_SURFACES
+from ..surfaces.facets.mesh import LAWS_OF_GROUPS
 from .keys import CODE, INTEGER, Form, Table, either, listed, named, tables
 
 # JSON Schema, draft 2020-12.
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-# Keys that a wall has and a group of a mesh may have too.
-_OF_GROUPS = ("restitution", "friction", "temperature", "accommodation", "laws")
 # Where user code may stand in place of a kind.
 _OWN_KINDS = ("surface", "method")
 # Keys of [particles] that go with a file.
@@ -64,7 +63,7 @@ def _definitions(known: dict[tuple[str, str], Table]) -> Form:
         key.name: {"const": key.default} if isinstance(key.default, float) else False
         for key in common.keys if key.name != "rotation"
     }  # fmt: skip
-    group = {key.name: key.form for key in common.keys if key.name in _OF_GROUPS}
+    group = {key.name: key.form for key in common.keys if key.name in LAWS_OF_GROUPS}
     made: Form = {
         "surface_keys": {"properties": _properties(common)},
         "surface": _one_of(known, "surface") | {"unevaluatedProperties": False},
@@ -138,10 +137,7 @@ def _particles(table: Table) -> Form:
     others = [key.name for key in table.keys if key.name not in _OF_FILES]
     return _object(table) | {
         "anyOf": [{"required": [name]} for name in ("count", "fraction", "from")],
-        "dependentSchemas": {
-            "from": {"properties": dict.fromkeys(others, False)},
-            "frame": {"required": ["from"]},
-        },
+        "dependentSchemas": {"from": {"properties": dict.fromkeys(others, False)}, "frame": {"required": ["from"]}},
     }
 
 

@@ -29,7 +29,6 @@ _LOG = logging.getLogger("swarm")
 # A body that turns farther in a step [rad], and how far it may.
 _FAR_TURN, _GOOD_TURN = 1.0, 0.3
 
-_LOG = logging.getLogger("swarm")
 # What a solid may enter by, between contact points, in half thicknesses of it or of the body, whichever is thinner.
 _ENTERS = 0.25
 # Points of a lattice of triangles with sides of 1 leave no gap of a larger radius; it is found to so much.

@@ -18,6 +18,7 @@ from ..sources.births import stream, with_births
 from ..sources.source import Source
 from ..state import Floats
 from ..surfaces.plane import along
+from ..surfaces.rotation import matrices
 from .body import Body
 from .copies import Bodies
 
@@ -68,8 +69,8 @@ def with_born(scene: Scene, bodies: Bodies, sources: tuple[Source, ...], seed: i
     spin = np.zeros_like(made.position) if made.spin is None else made.spin
     place, velocity, turning = (rows[:, None, number] for rows in (made.position, made.velocity, spin))
     of, across = made.births.source, scene.across()
-    turns = np.array([_turn(seed, int(of[i]), int(i), across) for i in number]).reshape(-1, 3, 3)
-    arms = np.einsum("nxy,yp->xpn", turns, _arms(body))
+    turns = np.array([_turn(seed, int(of[i]), int(i), across) for i in number]).reshape(-1, 4)
+    arms = np.einsum("nxy,yp->xpn", matrices(turns), _arms(body))
     position = np.concatenate([bodies.position, place + arms], axis=2)
     velocity = np.concatenate([bodies.velocity, velocity + np.cross(turning, arms, axis=0)], axis=2)
     all_of_them = Bodies.unchecked(body, position, velocity)
@@ -86,13 +87,12 @@ def _centers(bodies: Bodies) -> Particles:
 
 
 def _turn(seed: int, k: int, number: int, across: int | None) -> Floats:
-    """A rotation (3, 3), uniform among all, in a plane about its normal, of the birth with a number."""
+    """A rotation as a quaternion (4,), uniform among all, in a plane about its normal, of the birth with a number."""
     q = stream(seed, k, _TURNS, number).standard_normal(4)
     if across is not None:
         q[[1 + axis for axis in along(across)]] = 0.0
-    w, x, y, z = q / np.sqrt(q @ q)
-    cross = np.array([(0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)])
-    return np.asarray(np.eye(3) + 2.0 * (w * cross + cross @ cross))
+    # Not by BLAS: its last bit depends on the processor.
+    return np.asarray(q / np.sqrt((q**2).sum()))
 
 
 class BodyFeed(Feed):

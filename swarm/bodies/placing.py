@@ -8,6 +8,7 @@ from ..placing.filling import bounding_box
 from ..scene import Scene
 from ..state import Floats
 from ..surfaces.area_samples import directions
+from ..surfaces.rotation import matrices
 from .body import Body
 from .copies import Bodies
 
@@ -110,14 +111,7 @@ def _places(scene: Scene, probes: Floats, n: int, random: np.random.Generator) -
 def _rotations(random: np.random.Generator, n: int) -> Floats:
     """(3, 3, n) rotation matrices, uniform on SO(3): of quaternions uniform on the sphere."""
     normal = random.standard_normal((4, n))
-    w, x, y, z = normal / np.sqrt((normal**2).sum(axis=0))
-    return 2.0 * np.array(
-        [
-            [0.5 - (y * y + z * z), x * y - w * z, x * z + w * y],
-            [x * y + w * z, 0.5 - (x * x + z * z), y * z - w * x],
-            [x * z - w * y, y * z + w * x, 0.5 - (x * x + y * y)],
-        ]
-    )
+    return np.moveaxis(matrices((normal / np.sqrt((normal**2).sum(axis=0))).T), 0, 2)
 
 
 def _turned(turns: Floats, arms: Floats) -> Floats:

@@ -12,7 +12,7 @@ import click
 from ..common import interrupt
 from ..errors import CompleteError, SceneError, SwarmError, WallTimeError
 from .options import Option, Positional
-from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
+from .shown import EXIT_CODES, REASONS, Cluster, Plugins, Quiet, Walltime, command_again, table
 
 # Follows the reason why a run has stopped.
 _COMPILED = ", after a compilation that was under way"
@@ -36,17 +36,11 @@ def run(  # noqa: PLR0913  one argument an option
     resume: Annotated[
         bool, Option("--resume", help="Continue from the last checkpoint of a run that was stopped.")
     ] = False,
-    walltime: Annotated[
-        str | None,
-        Option(metavar="TIME", help="Stop after this time, such as 2h, with a checkpoint; the exit code is 75."),
-    ] = None,
+    walltime: Walltime = None,
     compile: Annotated[
         str | None, Option(metavar="WHEN", help="Compile the kernels: auto, always or never [default: auto].")
     ] = None,
-    cluster: Annotated[
-        str | None,
-        Option(metavar="WHERE", help="Run on a cluster: local:N, N workers here, or tcp://HOST:PORT of Dask."),
-    ] = None,
+    cluster: Cluster = None,
     shards: Annotated[
         int | None, Option(help="Shards of a run on a cluster [default: one for each thread of its workers].")
     ] = None,

@@ -11,8 +11,13 @@ from .options import Option, Positional
 TrajectoryFile = Annotated[Path, Positional(metavar="FILE.h5", help="A trajectory.")]
 Picture = Annotated[Path | None, Option("-o", "--output", metavar="OUT.png", help="Picture [default: FILE.png].")]
 Plugins = Annotated[
-    list[str] | None,
-    Option("--plugins", metavar="MODULE", help="Allow the file to name code of this module."),
+    list[str] | None, Option("--plugins", metavar="MODULE", help="Allow the file to name code of this module.")
+]
+Walltime = Annotated[
+    str | None, Option(metavar="TIME", help="Stop after this time, such as 2h, with a checkpoint; the exit code is 75.")
+]
+Cluster = Annotated[
+    str | None, Option(metavar="WHERE", help="Run on a cluster: local:N, N workers here, or tcp://HOST:PORT of Dask.")
 ]
 Quiet = Annotated[bool, Option("--quiet", help="No progress bar and no summary.")]
 

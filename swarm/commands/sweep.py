@@ -10,7 +10,7 @@ import click
 from ..common import interrupt
 from ..errors import SwarmError
 from .options import Option, Positional
-from .shown import EXIT_CODES, REASONS, Plugins, Quiet, command_again, table
+from .shown import EXIT_CODES, REASONS, Cluster, Plugins, Quiet, Walltime, command_again, table
 
 if TYPE_CHECKING:
     from ..fleet.sweeping import Outcome
@@ -35,14 +35,8 @@ def sweep(  # noqa: PLR0913  one argument an option
     resume: Annotated[
         bool, Option("--resume", help="Go on with the runs that the folder holds; those done are not run again.")
     ] = False,
-    walltime: Annotated[
-        str | None,
-        Option(metavar="TIME", help="Stop after this time, such as 2h, with checkpoints; the exit code is 75."),
-    ] = None,
-    cluster: Annotated[
-        str | None,
-        Option(metavar="WHERE", help="Run on a cluster: local:N, N workers here, or tcp://HOST:PORT of Dask."),
-    ] = None,
+    walltime: Walltime = None,
+    cluster: Cluster = None,
     plugins: Plugins = None,
     as_json: Annotated[
         bool, Option("--json", help="Print the outcome of the sweep as JSON, also if it fails.")
@@ -65,16 +59,7 @@ def sweep(  # noqa: PLR0913  one argument an option
             raise KeyboardInterrupt
         latest = None if walltime is None else duration("--walltime", walltime)
         options = sweeping.SweepOptions(
-            output,
-            processes,
-            threads,
-            resume,
-            overwrite,
-            not quiet,
-            written,
-            latest,
-            tuple(plugins or ()),
-            cluster,
+            output, processes, threads, resume, overwrite, not quiet, written, latest, tuple(plugins or ()), cluster
         )
         outcome = sweeping.carry_out_sweep(sweep_file, options, first)
     except KeyboardInterrupt:  # the second one

@@ -32,8 +32,7 @@ def info(
 def export(
     file: TrajectoryFile,
     output: Annotated[
-        Path,
-        Option("-o", "--output", metavar="OUT", help="OUT.vtkhdf, .xyz, .gsd, .ply, .csv, or .obj of the walls."),
+        Path, Option("-o", "--output", metavar="OUT", help="OUT.vtkhdf, .xyz, .gsd, .ply, .csv, or .obj of the walls.")
     ],
     frames: Annotated[
         str | None,

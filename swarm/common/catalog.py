@@ -52,9 +52,12 @@ class Observable(NamedTuple):
         return ["frames", *(str(LENGTHS.get(axis, plural[axis])) for axis in self.axes)]
 
 
-# In the order in which a sweep shows them.
+# In the order in which a sweep shows them: first what a scene has openings, absorbing walls or counters for.
 OBSERVABLES: dict[str, Observable] = {
     "time": Observable("s", "time of the frame", joined="same"),
+    "escaped": Observable("1", "particles that left through openings", every=True, main=True),
+    "absorbed": Observable("1", "particles that a law of the surface has absorbed", ("surface",), main=True),
+    "crossings": Observable("1", "particles that crossed the counter: out, back", ("counter", "sense"), main=True),
     "kinetic_energy": Observable("J", "kinetic energy, of rotation too for bodies", every=True, main=True),
     "total_energy": Observable(
         "J", "kinetic, potential and contact energy, of spins and of walls with a mass too", every=True, main=True
@@ -67,11 +70,8 @@ OBSERVABLES: dict[str, Observable] = {
     ),
     "impacts": Observable("1", "impacts on surfaces since the start", every=True, main=True),
     "collisions": Observable("1", "pairs of balls that met since the start", main=True),
-    "escaped": Observable("1", "particles that left through openings", every=True, main=True),
-    "absorbed": Observable("1", "particles that a law of the surface has absorbed", ("surface",), main=True),
     "born": Observable("1", "particles that the source has released", ("source",), main=True),
     "blocked": Observable("1", "births of balls that found no free place at their time", ("source",), main=True),
-    "crossings": Observable("1", "particles that crossed the counter: out, back", ("counter", "sense"), main=True),
     "wall_heat": Observable("J", "heat from the surface since the start", ("surface",), main=True),
     "wall_work": Observable("J", "work of the surface that moves, since the start", ("surface",), main=True),
     "work": Observable("J", "work of anchors of bodies that are led", main=True),
@@ -94,7 +94,7 @@ OBSERVABLES: dict[str, Observable] = {
     "angular_momentum": Observable("kg m2 s-1", "angular momentum about the origin, spins included", ("axis",)),
     "collision_rate": Observable("s-1", "pairs of balls that met in a second since the frame before", may_be_nan=True),
     "sliding_time": Observable("s", "time for which particles slid or rested, of all, since the start"),
-    "unconverged": Observable("1", "steps in which multipliers did not converge", every=True),
+    "unconverged": Observable("1", "steps in which multipliers, or friction of grains, did not converge", every=True),
     "sweeps": Observable("1", "sweeps of the loops of multipliers since the start"),
     "link_error": Observable("1", "largest relative error of the length of a link", joined="largest"),
     "part_impulse": Observable("N s", "normal impulse on the part of a union since the start", ("part",)),

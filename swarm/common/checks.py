@@ -141,11 +141,11 @@ def positive_magnitude(name: str, value: Any) -> float:
     return magnitude(name, positive(name, value))
 
 
-def part(name: str, value: Any) -> float:
-    """`value` as a number from 0 to 1."""
-    result = number(name, value, "a number from 0 to 1")
-    if not 0.0 <= result <= 1.0:
-        raise SceneError(f"{name} must be from 0 to 1, got {result:g}")
+def part(name: str, value: Any, least: float = 0.0) -> float:
+    """`value` as a number from the least one to 1."""
+    result = number(name, value, f"a number from {least:g} to 1")
+    if not least <= result <= 1.0:
+        raise SceneError(f"{name} must be from {least:g} to 1, got {result:g}")
     return result
 
 

@@ -38,8 +38,8 @@ def at_once() -> Iterator[None]:
 def importing() -> Iterator[None]:
     """`at_once` for the imports of a command, during which the garbage collector rests.
 
-    It would look through the modules again and again: 40 ms. What is there after the first imports is never collected,
-    as modules are not; what comes later is, as before.
+    The collector would look through the modules again and again, which takes 40 ms. Objects that exist after the first
+    imports are never collected, as modules are not; later ones are.
     """
     with uncollected(), at_once():
         try:

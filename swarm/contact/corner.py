@@ -38,7 +38,8 @@ def hold(form, law, multipliers, walls, step, reactions):
         before = r
         solved = _sweep(walls, form, law, multipliers, step, reactions)
         r = step.r + (step.p - total(reactions))
-        size, moved = max(largest(r), largest(step.p)), largest(r - before)
+        # In an acute edge the reactions are larger than what is left of them, and so is their round-off.
+        size, moved = max(largest(r), largest(step.p), _size_of(reactions)), largest(r - before)
         if solved and (reactions.shape[0] == 1 or (i > 0 and moved <= 4.0 * EPSILON * size)):
             return CornerEnd(r, True)
         if i > 0 and moved == 0.0:
@@ -57,6 +58,14 @@ def total(reactions):
     found = ZERO
     for k in range(reactions.shape[0]):
         found = found + _reaction_of(reactions, k)
+    return found
+
+
+def _size_of(reactions):
+    """The sum of the sizes of the reactions of all walls."""
+    found = 0.0
+    for k in range(reactions.shape[0]):
+        found += largest(_reaction_of(reactions, k))
     return found
 
 

@@ -3,6 +3,8 @@
 The force at a point is -V'(g) grad g, what the implicit rules and Verlet take.
 """
 
+import math
+
 from ..kernel.gravity import potential, weight
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
@@ -13,6 +15,8 @@ from ..surfaces.walls import Field
 # The force needs these of every wall.
 NEEDS = ("inner", "gap_of", "gap_slope", "discrete_gradient")
 
+# The part of |v|^2 up to which one Newton step of the square root restores it.
+_NEAR = 0.1
 # Units of round-off by which a contact that is solved may miss its energy.
 _ROUND_OFF = 64.0 * 2.220446049250313e-16
 
@@ -86,7 +90,11 @@ def restoring_factor(law, walls, after, gravity, budget, ends):
     uncertainty += energy_uncertainty(after, law, budget.over_mass, r1, s)
     uncertainty += speed2 + abs(budget.energy) + weight(gravity, s) + budget.force * total(s)
     balanced = abs(missing) <= _ROUND_OFF * uncertainty
-    return 1.0 + select(balanced & (speed2 > 0.0), 0.5 * missing / speed2, 0.0), balanced
+    moving = balanced & (speed2 > 0.0)
+    part = select(moving, missing / select(moving, speed2, 1.0), 0.0)
+    # Of a particle that all but rests the speed is round-off of the energy: a Newton step would overshoot.
+    rest = math.sqrt(select(part > -1.0, 1.0 + part, 0.0))
+    return select(abs(part) <= _NEAR, 1.0 + 0.5 * part, rest), balanced
 
 
 # --- The force -------------------------------------------------------------------------------------------

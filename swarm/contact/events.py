@@ -245,7 +245,7 @@ def careful(rules, walls, gravity, wall, p, impulse):
     shortest = 2.0 * GRAZING * rules.size / math.sqrt(own_speed2(p))
     contacts = touching.ImpactSettings(None, rules.laws, shortest, TOUCH * rules.size)
     return touching.impact(
-        contacts, walls, gravity, wall, touching.MovingParticle(p.r, p.v, p.remaining), energy_of(p.twice), impulse, 0
+        contacts, walls, gravity, wall, touching.ParticleMoment(p.r, p.v, p.remaining), energy_of(p.twice), impulse, 0
     )
 
 

@@ -23,15 +23,15 @@ from .reflection import from_relative, relative
 
 # A second wall nearer than this part of the shortest flight is met in the same instant.
 _SAME_INSTANT = 1e-6
-# Exact reflections within one instant: a wedge of 0.05 rad turns a particle around in its edge.
+# The most exact reflections within one instant: as many turn a particle around in the edge of a wedge of 0.05 rad.
 _BLOWS = 64
 # Sweeps until r1 and the discrete gradients agree: each gains the digits of h |v|/R.
 _SWEEPS = 60
-# The part of the speed of a wall that a velocity may be off along its normal.
+# The velocity of a particle along the normal of a wall that moves may be off by this part of the wall's speed.
 _OFF = 1e-13
-# Times that a step is cut because another wall is in the way.
+# A step is cut at most so many times because another wall is in the way.
 _CUTS = 60
-# These need of every wall; exact reflections need no more.
+# What the functions here ask of every wall; exact reflections ask for no more.
 NEEDS = ("first_hit", "unit_normal", "discrete_gradient", "distance", "project")
 
 
@@ -44,12 +44,12 @@ class ImpactSettings(Record):
     touch: float  # distance within which walls hold a sliding particle too [m]
 
 
-class MovingParticle(Record):
-    """A particle, and how much of its frame is left [s]."""
+class ParticleMoment(Record):
+    """A particle at a moment, with so much of the frame left [s]."""
 
     r: Vec
     v: Vec
-    remaining: float
+    remaining: Any
 
 
 class Landing(Record):
@@ -65,8 +65,9 @@ class Landing(Record):
 def impact(method, walls, gravity, wall, flight, energy, impulse, lane):
     """One impact of one particle on `wall` after a short flight.
 
-    Adds to impulse[:, lane] what each wall gives, then, where that has rows, the work per mass of each. If the next
-    flight would be shorter than the shortest too, the particle slides for that time instead.
+    Adds to impulse[:, lane] the impulse of each wall and, where the array has rows for it, the work per mass of each
+    behind them. If the flight after the impact would be shorter than the shortest too, the particle slides instead: for
+    as long as the shortest flight or, where it goes straight on, to the end of the frame.
     """
     r, v, half_inverse = flight.r, flight.v, energy.half_inverse
     carried, walls = walls, walls.at(flight.remaining)
@@ -123,8 +124,8 @@ def _slide(method, walls, gravity, wall, flight, energy, impulse, lane):
         # Walls do work.
         twice_energy = square(w) + 2.0 * potential(gravity, r)
     speed2, half_inverse = reflection.speed2_at(gravity, r, reflection.Energy(twice_energy, energy.half_inverse))
-    half_inverse = reflection.half_inverse_after(laws, speed2, w, half_inverse)
-    w = reflection.restore(gravity, w, speed2, half_inverse)
+    half_inverse = reflection.half_inverse_after(laws, speed2, half_inverse)
+    w = reflection.restore(w, speed2, half_inverse, reflection.may_lack_digits(laws, gravity))
     for i in range(count):
         taken = given[i] + 2.0 * touch.active[i]
         row, behind = walls.row(number[i]), walls.length()

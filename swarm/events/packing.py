@@ -55,8 +55,8 @@ def pack(
         n: number of balls, 1 or more; None: as many of the radius as fill the fraction, at most.
         radius: one number or (n,) [m], above 0; None: that of n equal balls that fill the fraction.
         fraction: of the admissible volume that the balls fill, from 0 to 0.6, in a plane of the area to 0.8; None:
-            what n balls of the radius fill. If all three are given, the radii are relative to one another: they are
-            scaled to the fraction.
+            what n balls of the radius fill. With n and a fraction, radii of each ball are relative to one another: they
+            are scaled to the fraction.
         seed: the same seed gives the same balls.
         speed: |v| of every ball [m/s], as in `fill`; without it and a temperature the balls are at rest.
         temperature: k_B T [J], as in `fill`.
@@ -66,8 +66,9 @@ def pack(
         The particles, with their `radius`, and their `volume`, as `fill` gives it.
 
     Raises:
-        SceneError: fewer than two of n, radius and fraction are given, an argument is out of its range, the balls are
-            too large for the vessel, or jam before they are as large as asked.
+        SceneError: fewer than two of n, radius and fraction are given, or all three with one number as the radius, an
+            argument is out of its range, the balls are too large for the vessel, or jam before they are as large as
+            asked.
 
     >>> import swarm
     >>> box = swarm.Scene(surfaces=[swarm.Box((0.5, 0.5, 0.5))])
@@ -98,9 +99,14 @@ def pack(
 def _radii(scene: Scene, n: int | None, radius: ArrayLike | None, fraction: float | None, room: VolumeBox) -> Floats:
     """The radii, from two of the three, or all."""
     given = {"n": n, "radius": radius, "fraction": fraction}
-    if sum(value is not None for value in given.values()) < 2:
-        came = [f"{name} = {value!r:.100}" for name, value in given.items() if value is not None]
+    came = [f"{name} = {value!r:.100}" for name, value in given.items() if value is not None]
+    if len(came) < 2:
         raise SceneError(f"pack needs two of n, radius and fraction, got {came[0] if came else 'none'}")
+    if radius is not None and len(came) == 3 and np.ndim(radius) == 0:
+        raise SceneError(
+            f"pack needs two of n, radius and fraction, got all: {', '.join(came)}; leave one out (a list of radii is "
+            "scaled to the fraction)"
+        )
     if fraction is not None:
         fraction = checks.positive("fraction", fraction)
         _require_below("fraction", fraction, len(scene.axes()), "")

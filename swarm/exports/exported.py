@@ -117,7 +117,9 @@ def numbers_of(frames: slice | int | None, n: int) -> range:
                 f"frames must be a slice of whole numbers with a step other than 0, got {frames}"
             ) from error
         if not found:
-            raise SceneError(f"frames must hold one of the frames 0 to {n - 1}, got {frames}")
+            ends = (frames.start, frames.stop) if frames.step is None else (frames.start, frames.stop, frames.step)
+            written = ":".join("" if end is None else str(end) for end in ends)
+            raise SceneError(f"frames must hold one of the frames 0 to {n - 1}, got {written}")
         return found if found.step > 0 else found[::-1]
     k = whole("frames", frames)
     if not -n <= k < n:

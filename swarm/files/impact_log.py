@@ -209,7 +209,8 @@ class ImpactLog(Stored):
             carries, and ways through openings, have no rows. A crossing is that of the centre of mass.
 
             Of particles with a radius a collision of two is a row too, of the one with the smaller number: `partner` is
-            the other one, -1 at a wall, `impulse` what each gives the other, and both `surface` and `member` are -1.
+            the other one, -1 at a wall, `impulse` what each gives the other along the line of their centres, and both
+            `surface` and `member` are -1.
 
             A contact of two grains, or of a grain with a wall, lasts, and has its row where it ends, as laws of walls
             act there: `time` is the end of the step, `velocity_before` is that at the start of the contact, `impulse`
@@ -217,6 +218,9 @@ class ImpactLog(Stored):
             and `friction_loss` [J], what friction and the resistance to rolling have taken. At a face of a mesh or an
             outline `member` is that of the end. A contact has no row that lasts at the end of the run, or that the wall
             leaves, by an opening or as it is `present` no more.
+
+            A contact of a point with a soft wall has its row where it ends too, with the whole impulse of that wall.
+            One that laws do not end, as the wall leaves or another wall absorbs the point, has the same velocity twice.
 
             In a run with counters a crossing is a row too, with an impulse of 0 and the velocity at the crossing twice:
             `counter` is the place of the counter in `counters` and `sense` 0 out of its admissible side, 1 back, and
@@ -294,13 +298,13 @@ class ImpactLog(Stored):
                 raise ValueError(f"expected particles below {self.count}, got {particle.min()} to {particle.max()}")
             (particles, surfaces, crossings), (begin, end) = wanted, span
             is_impact = wall >= 0
-            surface = np.where(is_impact, self._surface[np.maximum(wall, 0)], -1)
-            of_these = np.where(is_impact, surfaces[surface], crossings)
-            taken = (time >= begin) & (time < end) & particles[particle] & of_these
+            surface = _of_walls(self._surface, wall, -1)
+            taken = (time >= begin) & (time < end) & particles[particle]
+            taken &= _of_walls(surfaces[self._surface], wall, crossings)
             k = np.flatnonzero(taken)
             table = np.empty(len(k), self.dtype)
             table["time"], table["particle"], table["surface"] = time[k], particle[k], surface[k]
-            table["member"] = np.where(is_impact[k], self._member[np.maximum(wall[k], 0)], -1)
+            table["member"] = _of_walls(self._member, wall[k], -1)
             if self._counters:
                 is_event = (is_impact | self._is_collision(rows))[k]
                 table["counter"] = np.where(is_event, -1, (-1 - wall[k]) // 2)
@@ -315,6 +319,11 @@ class ImpactLog(Stored):
 def missing(file: Any) -> str | None:
     """The first part of a log of impacts that this file lacks, or None."""
     return next((name for name in _NEEDED if name not in file), None)
+
+
+def _of_walls(values: NDArray[Any], wall: NDArray[np.integer], other: Any) -> NDArray[Any]:
+    """The value of the wall of each row, `other` where that is below 0: a scene without a surface has no wall."""
+    return np.append(values, other)[np.where(wall >= 0, wall, -1)]
 
 
 def _among(name: str, numbers: Any, n: int) -> NDArray[np.bool_]:

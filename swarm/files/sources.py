@@ -17,8 +17,27 @@ DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, ArithmeticE
 _FULL = {os.strerror(number) for number in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))}
 
 
+# Which commands take files of a suffix, and the folder of a sweep.
+_COMMANDS = {
+    ".toml": "swarm check says what a scene file will do, and swarm run carries it out",
+    ".h5": "swarm info says what a trajectory holds, swarm plot draws it, and swarm record makes its recording",
+    ".rrd": "swarm view draws a recording, and swarm info says what it holds",
+}
+_OF_SWEEPS = "swarm report makes the page of a sweep, and its trajectories are in the folder"
+
+
 class DamagedError(SceneError):
     """A damaged file."""
+
+
+def commands_for(path: Path, needed: str = "") -> str:
+    """The end of a sentence about a path that is no file of the suffix `needed`: which command takes it, or ""."""
+    suffix = path.suffix.lower()
+    words = "" if suffix == needed else _COMMANDS.get(suffix, "")
+    if path.is_dir():
+        is_sweep = any((path / name).is_file() for name in ("sweep.toml", "results.csv", "results.parquet"))
+        words = _OF_SWEEPS if is_sweep else ""
+    return f"; {words}" if words else ""
 
 
 def require_file(path: Path, expected: str) -> None:
@@ -30,7 +49,7 @@ def require_file(path: Path, expected: str) -> None:
     except (OSError, ValueError) as error:
         raise SceneError(f"cannot read {str(path)!r}: {getattr(error, 'strerror', None) or error}") from error
     if stat.S_ISDIR(found.st_mode):
-        raise SceneError(f"{path} is a folder; expected {expected}")
+        raise SceneError(f"{path} is a folder; expected {expected}{commands_for(path)}")
     if not stat.S_ISREG(found.st_mode):
         raise SceneError(f"{path} is not a regular file; expected {expected}")
     if found.st_size == 0:

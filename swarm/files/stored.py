@@ -22,7 +22,7 @@ from ..serialization import plugins, run_tables, tables
 from ..surfaces.counter import Counter
 from . import driver, layout, superblock
 from .checksums import Checked
-from .sources import DAMAGE, DamagedError, reason, require_file
+from .sources import DAMAGE, DamagedError, commands_for, reason, require_file
 
 _STILL_WRITTEN = "already open"
 
@@ -185,7 +185,7 @@ def _opened(path: Path) -> h5py.File:
         if "signature not found" in str(error):
             raise DamagedError(
                 f"{path} is not an HDF5 file, or its beginning is damaged; expected a trajectory or a log of impacts, "
-                "which are .h5 files"
+                f"which are .h5 files{commands_for(path, '.h5')}"
             ) from error
         if getattr(error, "errno", None):
             raise SceneError(f"cannot read {path}: {reason(error)}") from error

@@ -532,12 +532,7 @@ class Trajectory(Stored):
         return cast(Path, view("animation").animate(self, path, frames, fps, size, particles, overwrite))
 
     def film(
-        self,
-        *,
-        frames: int = 100,
-        fps: float = 25.0,
-        size: tuple[int, int] = (640, 480),
-        particles: int = 5000,
+        self, *, frames: int = 100, fps: float = 25.0, size: tuple[int, int] = (640, 480), particles: int = 5000
     ) -> "Film":
         """A film of the particles or bodies among their walls, which a notebook shows.
 

@@ -1,5 +1,6 @@
 """The graphs of a sweep: each main observable against each parameter that varies, its mean and its spread."""
 
+import re
 from typing import Any
 
 import numpy as np
@@ -63,8 +64,8 @@ def worst(sweep: SweepFolder) -> list[tuple[str, str]]:
 
 
 def _stem(name: str) -> str:
-    """The observable of a column such as impulse_0."""
-    return next((known for known in MAIN if name == known or name.removeprefix(f"{known}_").isdecimal()), "")
+    """The observable of a column such as impulse_0 or crossings_0_1."""
+    return next((known for known in MAIN if re.fullmatch(rf"{known}(_\d+)*", name)), "")
 
 
 def _graph(sweep: SweepFolder, rows: list[dict[str, Any]], key: str, name: str) -> PagePicture:

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from ..run.progress import Display
     from ..run.session import Session
 
-# Seconds between looks at the jobs, and between requests to stop: jobs may begin after the first one.
+# Seconds between looks at the jobs, and between requests to stop, which are repeated for jobs that begin meanwhile.
 _GLANCE, _AGAIN = 0.1, 1.0
-# Seconds between the reports of a job; until another process that wrote the same file has ended.
+# Seconds between the reports of a job, and those in which another process that wrote the same file has to end.
 REPORTS, PATIENCE = 1.0, 30.0
 # "state": "done", "stopped" or "failed"; "error" of a failure; "lost" if the worker returned no outcome.
 JobEnd = dict[str, Any]

@@ -25,14 +25,13 @@ from ..errors import SceneError
 from ..files import marks, paths
 from ..methods.base import Method
 from ..observables import CHUNK
-from ..particles import Births, Particles
+from ..particles import ARRAYS, Births, Particles
 from ..run.machine import RunEnd
 from ..run.options import RunOptions, Task
 from ..run.tally import scales_of
 from ..state import Absorbed, Multipliers
 from . import sent_modules
 
-_ARRAYS = ("position", "velocity", "mass", "image", "radius", "spin")
 _BIRTHS = ("birth_time", "birth_source")
 
 
@@ -85,7 +84,7 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     balls = () if births is None else births.balls
     whole = Whole(task.compiled, task.method, options, body, bounds, start, scales_of(task), volume, balls)
     _replace(folder / "whole.pickle", lambda file: cloudpickle.dump(whole, file))
-    for name in _ARRAYS:
+    for name in ARRAYS:
         array = getattr(task.particles, name)
         if array is not None and not (name == "mass" and body):
             _replace(folder / f"{name}.npy", functools.partial(_save, array))
@@ -133,7 +132,7 @@ def _is_ours(path: Path) -> bool:
         return True
     if word.isdecimal():
         return suffix in (".end", ".checkpoint") or (suffix == ".h5" and marks.why_not(path, "trajectory") is None)
-    return path.name in ("whole.pickle", *(f"{name}.npy" for name in (*_ARRAYS, *_BIRTHS)))
+    return path.name in ("whole.pickle", *(f"{name}.npy" for name in (*ARRAYS, *_BIRTHS)))
 
 
 def tidy(folder: Path, count: int) -> None:
@@ -154,7 +153,7 @@ def task_of(folder: Path, k: int) -> Task:
     with open(folder / "whole.pickle", "rb") as file:
         whole: Whole = cloudpickle.load(file)
     first, last = whole.bounds[k : k + 2]
-    files = {name: folder / f"{name}.npy" for name in (*_ARRAYS, *_BIRTHS)}
+    files = {name: folder / f"{name}.npy" for name in (*ARRAYS, *_BIRTHS)}
     arrays = {name: np.load(file, mmap_mode="r") for name, file in files.items() if file.exists()}
     bodies = None
     if whole.body is None:
@@ -166,7 +165,7 @@ def task_of(folder: Path, k: int) -> Task:
             particles.births = Births(born[0], born[1], len(whole.options.sources), whole.balls)
     else:
         shape = 3, len(whole.body), -1
-        position, velocity = (np.array(arrays[name].reshape(shape)[..., first:last], order="C") for name in _ARRAYS[:2])
+        position, velocity = (np.array(arrays[name].reshape(shape)[..., first:last], order="C") for name in ARRAYS[:2])
         bodies = Bodies.unchecked(whole.body, position, velocity)
         if "image" in arrays:
             bodies.image = np.array(arrays["image"].reshape(shape)[:, 0, first:last], order="C")

@@ -7,11 +7,12 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from ..common import checks, interrupt
+from ..common import interrupt
 from ..common.checks import path_of
 from ..common.extras import needed_by
+from ..common.validated import Count, Flag, Positive, Validated, choice
 from ..errors import FileError, SceneError
 from ..files.lock import only_writer
 from ..run.options import cores
@@ -33,29 +34,22 @@ _TABLE_EVERY, _TABLE_SHARE = 10.0, 50.0
 
 
 @dataclass(frozen=True)
-class SweepOptions:
+class SweepOptions(Validated):
     """The options of a sweep; `sweep` describes each, `walltime` as of `simulate`."""
 
     folder: str | os.PathLike[str] | None = None
-    processes: int | None = None
-    threads: int | None = None
-    resume: bool = False
-    overwrite: bool = False
-    progress: bool = False
-    table: str = "csv"
-    walltime: float | None = None
+    processes: Count | None = None
+    threads: Count | None = None
+    resume: Flag = False
+    overwrite: Flag = False
+    progress: Flag = False
+    table: Annotated[str, choice(*TABLES)] = "csv"
+    walltime: Positive | None = None
     plugins: tuple[str, ...] = ()
     cluster: Any = None
 
     def __post_init__(self) -> None:
-        for name in ("processes", "threads"):
-            if getattr(self, name) is not None:
-                checks.count(name, getattr(self, name))
-        for name in ("resume", "overwrite", "progress"):
-            checks.flag(name, getattr(self, name))
-        checks.one_of("table", self.table, TABLES)
-        if self.walltime is not None:
-            checks.positive("walltime", self.walltime)
+        super().__post_init__()
         if self.resume and self.overwrite:
             raise SceneError("resume and overwrite contradict each other: leave one of them out")
         if self.cluster is not None:

@@ -7,6 +7,7 @@ from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, dot, square
 from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field
+from . import grain_arrays as col
 from .contacts import (
     Closing,
     begin_solve,
@@ -20,32 +21,7 @@ from .contacts import (
     weight_of,
     worse,
 )
-from .grain_arrays import (
-    AFTER,
-    BEFORE,
-    BEGIN,
-    COAST,
-    DAMPING,
-    DRAG,
-    EASE,
-    END,
-    GAIN,
-    GAP,
-    IMPULSE,
-    KEPT_ROLL,
-    LIGHTNESS,
-    LISTED,
-    PUSH,
-    RADIUS,
-    ROLL,
-    SCALE,
-    SIZE,
-    START,
-    OfWall,
-    X,
-    set_vector,
-    vector_at,
-)
+from .grain_arrays import OfWall, set_vector, vector_at
 from .heavy_walls import ease_along, note_eases, react, rest_of
 from .vessel import met
 
@@ -80,42 +56,43 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
             continue
         a = near.slot[index(k)]
         i = index(a)
-        r0, own = vector_at(place, i, X), met(wall, near.listed, near.spans, index(k), place[i, RADIUS])
-        coast = half * vector_at(speed, i, BEFORE)
-        move = coast + half * vector_at(speed, i, AFTER)
+        r0, own = vector_at(place, i, col.X), met(wall, near.listed, near.spans, index(k), place[i, col.RADIUS])
+        coast = half * vector_at(speed, i, col.BEFORE)
+        move = coast + half * vector_at(speed, i, col.AFTER)
         q0 = own.inner(r0)
         is_in = (own.level_of(q0) > 0.0) | (own.level_of(own.end_inner(r0 + move)) > 0.0)
         if near.wall_is_open is not None:
             is_in = is_in & (not near.wall_is_open[index(k)])
         if matter.holds is not None:
-            is_in = is_in & (place[i, LIGHTNESS] > 0.0)
+            is_in = is_in & (place[i, col.LIGHTNESS] > 0.0)
         if is_in:
             near.wall_is_on[index(k)] = True
             c = index(start + count)
             touches.wall_ends[c] = a
             if isinstance(wall, Field):
-                touches.spans[c, BEGIN], touches.spans[c, END] = near.spans[index(k), BEGIN], near.spans[index(k), END]
-            set_vector(rows, c, START, r0)
+                for end in (col.BEGIN, col.END):
+                    touches.spans[c, end] = near.spans[index(k), end]
+            set_vector(rows, c, col.START, r0)
             # What round-off has taken of the place, along the normal.
             steep, _bend = own.gap_slope(q0, q0)
             n = own.discrete_gradient(r0, r0)
             lost = dot(n, rest_of(own, place, i))
-            rows[c, SIZE], rows[c, GAP] = q0, own.gap_of(q0) + steep * lost
-            set_vector(rows, c, COAST, coast)
-            rows[c, EASE] = place[i, LIGHTNESS]
+            rows[c, col.SIZE], rows[c, col.GAP] = q0, own.gap_of(q0) + steep * lost
+            set_vector(rows, c, col.COAST, coast)
+            rows[c, col.EASE] = place[i, col.LIGHTNESS]
             note_eases(own, rows, c, n)
             ease = ease_along(own, rows, c)
             if law.damping is not None:
-                rows[c, DAMPING] = law.damping / math.sqrt(ease) / matter.h
+                rows[c, col.DAMPING] = law.damping / math.sqrt(ease) / matter.h
             way = rising(own, r0, q0, move)
-            v, carried = vector_at(speed, i, AFTER), velocity_at_end(own, r0 + move)
+            v, carried = vector_at(speed, i, col.AFTER), velocity_at_end(own, r0 + move)
             speeds = size_of(v - carried), size_of(v) + size_of(carried)
-            first = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
-            rows[c, PUSH], rows[c, GAIN] = begin_solve(first, half * ease * square(way.along))
-            rows[c, SCALE] = scale_of(matter, rows[c, PUSH], speeds, ease)
-            set_vector(rows, c, IMPULSE, rows[c, PUSH] * way.along)
+            first = pressed(matter, damper(law.damping, rows, c), rows[c, col.GAP], way.change)
+            rows[c, col.PUSH], rows[c, col.GAIN] = begin_solve(first, half * ease * square(way.along))
+            rows[c, col.SCALE] = scale_of(matter, rows[c, col.PUSH], speeds, ease)
+            set_vector(rows, c, col.IMPULSE, rows[c, col.PUSH] * way.along)
             if near.wall_drag is not None:
-                rows[c, LISTED] = k
+                rows[c, col.LISTED] = k
             _recall(law, near, rows, c, index(k))
             count += 1
     touches.wall_spans[1, number] = count
@@ -125,22 +102,22 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
 def _recall(law, near, rows, c, k):
     """Begin friction and rolling with their impulses of the step before, where the contact has lasted."""
     if law.friction is not None:
-        set_vector(rows, c, DRAG, vector_at(near.wall_drag, k, 0) * lasting(rows[c, GAP]))
+        set_vector(rows, c, col.DRAG, vector_at(near.wall_drag, k, 0) * lasting(rows[c, col.GAP]))
     if law.rolling is not None:
-        set_vector(rows, c, ROLL, vector_at(near.wall_drag, k, KEPT_ROLL) * lasting(rows[c, GAP]))
+        set_vector(rows, c, col.ROLL, vector_at(near.wall_drag, k, col.KEPT_ROLL) * lasting(rows[c, col.GAP]))
 
 
 def press_at_wall(matter, law, own, grains, rows, at, share):
     """Improve the impulse of a ball at a wall: its `Closing`, the velocity then, and the change as for pairs."""
     c, i = at
-    half, v = 0.5 * matter.h, vector_at(grains.speed, i, AFTER)
-    way = rising(own, vector_at(rows, c, START), rows[c, SIZE], vector_at(rows, c, COAST) + half * v)
-    wanted, _slope = pressed(matter, damper(law.damping, rows, c), rows[c, GAP], way.change)
-    rows[c, PUSH] = improved(rows[c, PUSH], wanted, rows[c, GAIN])
-    more, part = change_of(OfWall(rows, c), IMPULSE, rows[c, PUSH] * way.along, share)
+    half, v = 0.5 * matter.h, vector_at(grains.speed, i, col.AFTER)
+    way = rising(own, vector_at(rows, c, col.START), rows[c, col.SIZE], vector_at(rows, c, col.COAST) + half * v)
+    wanted, _slope = pressed(matter, damper(law.damping, rows, c), rows[c, col.GAP], way.change)
+    rows[c, col.PUSH] = improved(rows[c, col.PUSH], wanted, rows[c, col.GAIN])
+    more, part = change_of(OfWall(rows, c), col.IMPULSE, rows[c, col.PUSH] * way.along, share)
     react(own, part)
-    off = weight_of(law) * (size_of(more) * rows[c, SCALE])
-    return way, v + part * rows[c, EASE], off
+    off = weight_of(law) * (size_of(more) * rows[c, col.SCALE])
+    return way, v + part * rows[c, col.EASE], off
 
 
 @outlined
@@ -150,9 +127,9 @@ def sweep_wall(matter, law, wall, grains, touches, number, share):
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        own = met(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS])
+        own = met(wall, touches.listed, touches.spans, c, grains.place[i, col.RADIUS])
         _way, v, off = press_at_wall(matter, law, own, grains, rows, (c, i), share)
-        set_vector(grains.speed, i, AFTER, v)
+        set_vector(grains.speed, i, col.AFTER, v)
         worst = worse(off, worst)
     return worst
 
@@ -163,7 +140,7 @@ def push_walls(law, grains, touches, number):
     rows, speed, begin = touches.wall_rows, grains.speed, touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
-        i, impulse = index(touches.wall_ends[c]), vector_at(rows, c, IMPULSE)
+        i, impulse = index(touches.wall_ends[c]), vector_at(rows, c, col.IMPULSE)
         if law.friction is not None:
-            impulse = impulse + vector_at(rows, c, DRAG)
-        set_vector(speed, i, AFTER, vector_at(speed, i, AFTER) + impulse * rows[c, EASE])
+            impulse = impulse + vector_at(rows, c, col.DRAG)
+        set_vector(speed, i, col.AFTER, vector_at(speed, i, col.AFTER) + impulse * rows[c, col.EASE])

@@ -9,26 +9,10 @@ from ..kernel.arrays import index, unwritten
 from ..kernel.jit import Array, outlined
 from ..kernel.lines import LANES
 from ..kernel.vector import dot, norm
+from . import grain_arrays as col
 from .at_walls import rising
 from .contacts import closing, worse
-from .grain_arrays import (
-    AFTER,
-    BEFORE,
-    COAST,
-    COLUMNS_OF_BALLS,
-    DRAG,
-    GAP,
-    IMPULSE,
-    PLACE,
-    PUSH,
-    RADIUS,
-    RUBBED,
-    SIZE,
-    START,
-    set_vector,
-    vector_at,
-    vector_in,
-)
+from .grain_arrays import set_vector, vector_at, vector_in
 from .heavy_walls import is_heavy
 from .lanes_of_pairs import (
     balls_of,
@@ -87,18 +71,19 @@ _VIRIAL, _END, _LOST, _BOOKED = 0, 1, 2, 3
 
 def _weigh(matter, rows, q, lane, read, booked, notes):
     """Compute what is booked of a contact."""
-    s0, impulse = vector_in(rows, q + START, lane), vector_in(rows, q + IMPULSE, lane)
+    s0, impulse = vector_in(rows, q + col.START, lane), vector_in(rows, q + col.IMPULSE, lane)
     move = move_in(matter, rows, q, lane, slip_in(read, _SLIP, lane))
-    gap, way, lost = rows[q + GAP, lane], closing(s0, rows[q + SIZE, lane], move), 0.0
+    gap, way, lost = rows[q + col.GAP, lane], closing(s0, rows[q + col.SIZE, lane], move), 0.0
     booked[_VIRIAL, lane], booked[_END, lane] = dot(s0 + 0.5 * move, impulse), gap + way.change
     if matter.pairs.damping is not None:
         lost = _lost(matter, dot(impulse, move), gap, way.change)
     if matter.pairs.friction is not None:
-        gained, lines = dot(vector_in(rows, q + DRAG, lane), move) / matter.h, (_SPINS, _SPINS + COLUMNS_OF_BALLS)
-        turned = turning_in(read, *lines, BEFORE, lane) + turning_in(read, *lines, AFTER, lane)
+        gained = dot(vector_in(rows, q + col.DRAG, lane), move) / matter.h
+        lines = _SPINS, _SPINS + col.COLUMNS_OF_BALLS
+        turned = turning_in(read, *lines, col.BEFORE, lane) + turning_in(read, *lines, col.AFTER, lane)
         gained = gained - 0.5 * dot(twist_in(rows, q, lane, move), turned)
         if notes:
-            rows[q + RUBBED, lane] = -gained
+            rows[q + col.RUBBED, lane] = -gained
         lost = lost - gained
     booked[_LOST, lane] = 0.5 * lost
 
@@ -106,7 +91,7 @@ def _weigh(matter, rows, q, lane, read, booked, notes):
 def _enter(matter, books, rows, q, lane, numbers, booked):
     """Book a contact of the particles with these numbers."""
     one, other = numbers
-    if (rows[q + GAP, lane] <= 0.0) & (booked[_END, lane] > 0.0):
+    if (rows[q + col.GAP, lane] <= 0.0) & (booked[_END, lane] > 0.0):
         books.collisions[one] += 1
         books.collisions[other] += 1
     if matter.pairs.damping is not None or matter.pairs.friction is not None:
@@ -134,11 +119,11 @@ def book_pairs(matter, grains, near, touches, books, notes):
             lane = index(k)
             i, j = balls_of(ends, e, lane)
             virial += booked[_VIRIAL, lane]
-            deepest = worse(booked[_END, lane], worse(rows[q + GAP, lane], deepest))
+            deepest = worse(booked[_END, lane], worse(rows[q + col.GAP, lane], deepest))
             _enter(matter, books, rows, q, lane, (index(number[i]), index(number[j])), booked)
             if matter.pairs.friction is not None:
-                listed = index(ends[e + PLACE, lane])
-                set_vector(near.drag, listed, 0, vector_in(rows, q + DRAG, lane))
+                listed = index(ends[e + col.PLACE, lane])
+                set_vector(near.drag, listed, 0, vector_in(rows, q + col.DRAG, lane))
     books.virial[0] += virial
     return deepest
 
@@ -151,13 +136,13 @@ def book_wall(matter, law, wall, grains, touches, books, number):
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        one, gap, push = index(grains.number[i]), rows[c, GAP], rows[c, PUSH]
-        move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
-        own = met(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS])
-        way = rising(own, vector_at(rows, c, START), rows[c, SIZE], move)
+        one, gap, push = index(grains.number[i]), rows[c, col.GAP], rows[c, col.PUSH]
+        move = vector_at(rows, c, col.COAST) + half * vector_at(speed, i, col.AFTER)
+        own = met(wall, touches.listed, touches.spans, c, grains.place[i, col.RADIUS])
+        way = rising(own, vector_at(rows, c, col.START), rows[c, col.SIZE], move)
         deepest = max(deepest, max(gap, gap + way.change))
         books.impacts[one] += (gap <= 0.0) & (gap + way.change > 0.0)
-        impulse = vector_at(rows, c, IMPULSE)
+        impulse = vector_at(rows, c, col.IMPULSE)
         books.impulse[index(number), one] += norm(impulse)
         work = dot(impulse, move)
         if gives_work(wall):
@@ -180,11 +165,11 @@ def count_members(matter, wall, grains, touches, members, number):
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        r0, gap = vector_at(rows, c, START), rows[c, GAP]
-        move = vector_at(rows, c, COAST) + half * vector_at(grains.speed, i, AFTER)
-        own = met(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS])
-        if gap <= 0.0 and gap + rising(own, r0, rows[c, SIZE], move).change > 0.0:
+        r0, gap = vector_at(rows, c, col.START), rows[c, col.GAP]
+        move = vector_at(rows, c, col.COAST) + half * vector_at(grains.speed, i, col.AFTER)
+        own = met(wall, touches.listed, touches.spans, c, grains.place[i, col.RADIUS])
+        if gap <= 0.0 and gap + rising(own, r0, rows[c, col.SIZE], move).change > 0.0:
             place = places[
-                index(met_member(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS], r0 + move))
+                index(met_member(wall, touches.listed, touches.spans, c, grains.place[i, col.RADIUS], r0 + move))
             ]
             members.counts.add(place, 1)

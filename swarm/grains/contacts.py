@@ -15,26 +15,9 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import absolute, dot, square, total
+from . import grain_arrays as col
 from .cell import nearest
-from .grain_arrays import (
-    AFTER,
-    BEFORE,
-    DAMPING,
-    EXTENT,
-    FROM,
-    LAST,
-    LIGHTNESS,
-    LOST,
-    MOVE,
-    ONE,
-    OTHER,
-    PLACE,
-    RADIUS,
-    YIELDING,
-    X,
-    set_vector,
-    vector_at,
-)
+from .grain_arrays import set_vector, vector_at
 
 _TINY = 1e-300
 # No less than this part of the velocities counts as what moves at a contact: round-off of them is then 1e-10 of it, and
@@ -68,6 +51,7 @@ class Matter(Record):
     openings: Any  # of all walls, or None
     counters: Any = None  # `counters.Counters`, or None
     holds: Any = None  # True where walls hold balls, else None
+    slips: float = 0.0  # the tolerance of friction
 
     @property
     def rubs(self):
@@ -109,7 +93,7 @@ def pressed(matter, damping, gap, change):
 
 def damper(own, rows, c):
     """The damping in a row, or None for a law without damping."""
-    return None if own is None else rows[c, DAMPING]
+    return None if own is None else rows[c, col.DAMPING]
 
 
 def weight_of(law):
@@ -177,12 +161,15 @@ def size_of(a):
 class ContactSweep(Record):
     """One of some sweeps: its number, 0 where it goes over all contacts, the share of changes, and what is solved.
 
+    `inverse` is 1/omega of successive over-relaxation, by which friction changes omega times as much as it would alone.
+
     Which contacts a later sweep for friction goes over is noted by their balls, `Touches.stirred`.
     """
 
     number: int
     share: float
     solved: float
+    inverse: float
 
 
 def is_due(sweep, stirred, i):
@@ -216,8 +203,8 @@ def closing(s0, size, move):
 
 def apart(matter, place, i, j):
     """The vector from ball j to ball i, with what round-off has taken of their places."""
-    s = nearest(matter.period, vector_at(place, i, X), vector_at(place, j, X))
-    return s + (vector_at(place, i, LOST) - vector_at(place, j, LOST))
+    s = nearest(matter.period, vector_at(place, i, col.X), vector_at(place, j, col.X))
+    return s + (vector_at(place, i, col.LOST) - vector_at(place, j, col.LOST))
 
 
 def _approach(matter, grains, ball, j):
@@ -227,36 +214,36 @@ def _approach(matter, grains, ball, j):
     """
     (i, here), place, speed = ball, grains.place, grains.speed
     s0 = apart(matter, place, i, j)
-    move = 0.5 * matter.h * (here - (vector_at(speed, j, BEFORE) + vector_at(speed, j, AFTER)))
-    q0, q1, reach = square(s0), square(s0 + move), place[i, RADIUS] + place[j, RADIUS]
+    move = 0.5 * matter.h * (here - (vector_at(speed, j, col.BEFORE) + vector_at(speed, j, col.AFTER)))
+    q0, q1, reach = square(s0), square(s0 + move), place[i, col.RADIUS] + place[j, col.RADIUS]
     nearest_one = select(q1 < q0, q1, q0)
     if matter.holds is None:
         return nearest_one, reach
     # Where walls hold both they do not meet.
-    return select(place[i, LIGHTNESS] + place[j, LIGHTNESS] > 0.0, nearest_one, math.inf), reach
+    return select(place[i, col.LIGHTNESS] + place[j, col.LIGHTNESS] > 0.0, nearest_one, math.inf), reach
 
 
 def _note(rows, c, a, b, k):
-    rows[c, ONE], rows[c, OTHER], rows[c, PLACE] = a, b, k
+    rows[c, col.ONE], rows[c, col.OTHER], rows[c, col.PLACE] = a, b, k
 
 
 def foresee(matter, grains, course, i):
     """Write the course of a ball in the step, by its velocities at both ends."""
     place, speed = grains.place, grains.speed
-    set_vector(course, i, FROM, vector_at(place, i, X))
-    set_vector(course, i, MOVE, 0.5 * matter.h * (vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER)))
-    course[i, EXTENT], course[i, YIELDING] = place[i, RADIUS], place[i, LIGHTNESS]
+    set_vector(course, i, col.FROM, vector_at(place, i, col.X))
+    set_vector(course, i, col.MOVE, 0.5 * matter.h * (vector_at(speed, i, col.BEFORE) + vector_at(speed, i, col.AFTER)))
+    course[i, col.EXTENT], course[i, col.YIELDING] = place[i, col.RADIUS], place[i, col.LIGHTNESS]
 
 
 def _approach_of(matter, course, ball, j):
     """`_approach` by the courses of both balls, that of the first one as it was read: for what round-off decides."""
     here, move, extent, yielding = ball
-    s0 = nearest(matter.period, here, vector_at(course, j, FROM))
-    q0, q1 = square(s0), square(s0 + (move - vector_at(course, j, MOVE)))
-    nearest_one, reach = select(q1 < q0, q1, q0), extent + course[j, EXTENT]
+    s0 = nearest(matter.period, here, vector_at(course, j, col.FROM))
+    q0, q1 = square(s0), square(s0 + (move - vector_at(course, j, col.MOVE)))
+    nearest_one, reach = select(q1 < q0, q1, q0), extent + course[j, col.EXTENT]
     if matter.holds is None:
         return nearest_one, reach
-    return select(yielding + course[j, YIELDING] > 0.0, nearest_one, math.inf), reach
+    return select(yielding + course[j, col.YIELDING] > 0.0, nearest_one, math.inf), reach
 
 
 @outlined
@@ -276,7 +263,8 @@ def find_pairs(matter, near, touches):
     known, count, passed, margin = touches.used[0], touches.used[0], 0, touches.margin[0]
     for a in range(course.shape[0]):
         i = index(a)
-        ball = vector_at(course, i, FROM), vector_at(course, i, MOVE), course[i, EXTENT], course[i, YIELDING]
+        extent, yielding = course[i, col.EXTENT], course[i, col.YIELDING]
+        ball = vector_at(course, i, col.FROM), vector_at(course, i, col.MOVE), extent, yielding
         for k in range(near.first[i], near.first[i + 1]):
             b, was_on = near.mate[index(k)], near.is_on[index(k)]
             q, reach = _approach_of(matter, course, ball, index(b))
@@ -298,9 +286,9 @@ def _find_missed(matter, grains, near, touches):
     speed, found, missed, count = grains.speed, touches.found, touches.missed, touches.used[0]
     known = count
     for m in range(touches.passed[0]):
-        a, b, k = missed[index(m), ONE], missed[index(m), OTHER], missed[index(m), PLACE]
+        a, b, k = missed[index(m), col.ONE], missed[index(m), col.OTHER], missed[index(m), col.PLACE]
         i = index(a)
-        ball = i, vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER)
+        ball = i, vector_at(speed, i, col.BEFORE) + vector_at(speed, i, col.AFTER)
         q, reach = _approach(matter, grains, ball, index(b))
         if (q < reach * reach) & (not near.is_on[index(k)]):
             near.is_on[index(k)] = True
@@ -325,10 +313,10 @@ def travel_of(matter, grains):
     off, farthest, longest = 0.0, 0.0, 0.0
     for k in range(place.shape[0]):
         i = index(k)
-        v, end = vector_at(speed, i, BEFORE), vector_at(speed, i, AFTER)
-        off = worse(square(end - (v + vector_at(grains.change, i, LAST))), off)
+        v, end = vector_at(speed, i, col.BEFORE), vector_at(speed, i, col.AFTER)
+        off = worse(square(end - (v + vector_at(grains.change, i, col.LAST))), off)
         move = (v + end) * half
-        farthest = worse(square(vector_at(place, i, X) + move - vector_at(listed, i, X)), farthest)
+        farthest = worse(square(vector_at(place, i, col.X) + move - vector_at(listed, i, col.X)), farthest)
         longest = worse(square(move), longest)
     return Travel(half * math.sqrt(off), farthest, longest)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..kernel.arrays import index
 from ..kernel.jit import Array, long_kernel, outlined
-from .grain_arrays import FACE
+from . import grain_arrays as col
 
 # Columns that are the other way round for the other particle: the impulses of friction and of rolling.
 _TURNS = 6
@@ -90,7 +90,7 @@ def _keep_at_wall(number, near, kept, wall):
         k, c = index(m), index(kept.used[1])
         if _copy(kept.wall_drag, c, near.wall_drag, k, 1.0):
             kept.number[c], kept.wall[c] = number[index(near.slot[k])], wall
-            kept.face[c] = 0 if near.spans is None else near.spans[k, FACE]
+            kept.face[c] = 0 if near.spans is None else near.spans[k, col.FACE]
             kept.used[1] += 1
 
 
@@ -129,6 +129,6 @@ def _listed_at(near, wall, a, face):
         else:
             last = middle
     if near.spans is not None:
-        while k < end and near.slot[index(k)] == a and near.spans[index(k), FACE] != face:
+        while k < end and near.slot[index(k)] == a and near.spans[index(k), col.FACE] != face:
             k += 1
     return k if k < end and near.slot[index(k)] == a else -1

@@ -3,8 +3,9 @@
 from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import norm, put
+from . import grain_arrays as col
 from .contacts import apart
-from .grain_arrays import BEFORE, RADIUS, X, vector_at
+from .grain_arrays import vector_at
 from .held import is_held, velocity_of
 from .vessel import met
 
@@ -18,8 +19,8 @@ def store_at_walls(matter, walls, remaining, grains, near, into):
             if near.wall_is_open is not None and near.wall_is_open[index(k)]:
                 continue
             i = index(near.slot[index(k)])
-            own = met(wall, near.listed, near.spans, index(k), place[i, RADIUS])
-            into[index(grains.number[i])] += matter.law.stored_energy(own.gap_of(own.inner(vector_at(place, i, X))))
+            own = met(wall, near.listed, near.spans, index(k), place[i, col.RADIUS])
+            into[index(grains.number[i])] += matter.law.stored_energy(own.gap_of(own.inner(vector_at(place, i, col.X))))
 
 
 @outlined
@@ -27,8 +28,8 @@ def _stored_at_wall(matter, wall, grains, near, number):
     place, stored, deepest = grains.place, 0.0, 0.0
     for k in range(near.wall_first[number], near.wall_first[number + 1]):
         i = index(near.slot[index(k)])
-        own = met(wall, near.listed, near.spans, index(k), place[i, RADIUS])
-        gap = own.gap_of(own.inner(vector_at(place, i, X)))
+        own = met(wall, near.listed, near.spans, index(k), place[i, col.RADIUS])
+        gap = own.gap_of(own.inner(vector_at(place, i, col.X)))
         stored += matter.law.stored_energy(gap)
         deepest = max(deepest, gap)
     return stored, deepest
@@ -42,7 +43,7 @@ def stored(matter, walls, grains, near):
         i = index(a)
         for k in range(near.first[i], near.first[i + 1]):
             j = index(near.mate[index(k)])
-            gap = place[i, RADIUS] + place[j, RADIUS] - norm(apart(matter, place, i, j))
+            gap = place[i, col.RADIUS] + place[j, col.RADIUS] - norm(apart(matter, place, i, j))
             total += matter.law.stored_energy(gap)
             deepest = max(deepest, gap)
     for k, wall in enumerate(walls.at(0.0).each):
@@ -60,7 +61,7 @@ def show(grains, state, held):
         one, v = index(grains.number[i]), velocity_of(held, grains, i)
         put(state.velocity, 0, one, v)
         for axis in range(3):
-            state.position[axis, one] = grains.place[i, X + axis]
+            state.position[axis, one] = grains.place[i, col.X + axis]
             if grains.spin is not None:
-                turned = held.spin[axis, one] if is_held(held, one) else grains.spin[i, BEFORE + axis]
+                turned = held.spin[axis, one] if is_held(held, one) else grains.spin[i, col.BEFORE + axis]
                 state.balls.spin[axis, one] = turned

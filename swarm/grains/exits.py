@@ -17,8 +17,9 @@ from ..kernel.vector import norm
 from ..lanes.watching.log import Struck
 from ..surfaces.periodic.period import into
 from ..surfaces.presence.openings import is_open
+from . import grain_arrays as col
 from .contacts import apart
-from .grain_arrays import AFTER, RADIUS, X, vector_at
+from .grain_arrays import vector_at
 from .heavy_walls import place_on
 from .overlaps import move_of
 from .vessel import met, met_member
@@ -31,7 +32,7 @@ def open_wall(matter, wall, numbers, grains, near):
     for k in range(near.wall_first[number], near.wall_first[number + 1]):
         c = index(k)
         i = index(near.slot[c])
-        r, radius = vector_at(place, i, X), place[i, RADIUS]
+        r, radius = vector_at(place, i, col.X), place[i, col.RADIUS]
         own = met(wall, near.listed, near.spans, c, radius)
         # Its length is 1 on the wall alone.
         n = own.unit_normal(r)
@@ -51,8 +52,8 @@ def let_out(matter, wall, world, given):
         c = index(k)
         if near.wall_is_open[c]:
             i = index(near.slot[c])
-            one, r = index(grains.number[i]), vector_at(place, i, X)
-            own = met(wall, near.listed, near.spans, c, place[i, RADIUS])
+            one, r = index(grains.number[i]), vector_at(place, i, col.X)
+            own = met(wall, near.listed, near.spans, c, place[i, col.RADIUS])
             books.dissipated[one] += matter.law.stored_energy(own.gap_of(own.inner(r)))
             end = r + move_of(matter, grains, i)
             reaches = own.level_of(own.end_inner(end)) > 0.0
@@ -60,9 +61,9 @@ def let_out(matter, wall, world, given):
                 books.escape_time[one] = time
                 if noting is not None:
                     member = noting.places[number][
-                        index(met_member(wall, near.listed, near.spans, c, place[i, RADIUS], end))
+                        index(met_member(wall, near.listed, near.spans, c, place[i, col.RADIUS], end))
                     ]
-                    back, v = into(noting.period, end), vector_at(grains.speed, i, AFTER)
+                    back, v = into(noting.period, end), vector_at(grains.speed, i, col.AFTER)
                     struck = Struck(grains.number[i], float(member), time, back.r, v, v, 0.0)
                     noting.log.ended(noting.image, struck, back.images)
                 found += 1
@@ -76,7 +77,7 @@ def stored_with_others(matter: Any, world: Any, gone: NDArray[np.bool_]) -> NDAr
     one, other = np.repeat(np.arange(len(gone)), np.diff(first)), near.mate[: int(first[-1])]
     for k in np.flatnonzero(gone[one] | gone[other]):
         i, j = int(one[k]), int(other[k])
-        gap = place[i, RADIUS] + place[j, RADIUS] - norm(apart(matter, place, i, j))
+        gap = place[i, col.RADIUS] + place[j, col.RADIUS] - norm(apart(matter, place, i, j))
         ends = [end for end in (i, j) if gone[end]]
         found[ends] += matter.law.stored_energy(gap) / len(ends)
     return found

@@ -19,26 +19,10 @@ from ..kernel.jit import outlined, select
 from ..kernel.limits import EPSILON
 from ..kernel.vector import ZERO, cross, dot, square
 from ..surfaces.in_motion.posed import Posed
+from . import grain_arrays as col
 from .at_walls import press_at_wall, rising, velocity_at_end
 from .contacts import change_of, is_due, size_of, stir, worse
-from .grain_arrays import (
-    AFTER,
-    BEFORE,
-    COAST,
-    DRAG,
-    EASE,
-    LISTED,
-    PUSH,
-    RADIUS,
-    ROUNDNESS,
-    RUBBED,
-    SCALE,
-    SIZE,
-    START,
-    OfWall,
-    set_vector,
-    vector_at,
-)
+from .grain_arrays import ROUNDNESS, OfWall, set_vector, vector_at
 from .heavy_walls import ease_across, is_heavy, now, react
 from .vessel import gives_work, met
 
@@ -92,9 +76,9 @@ def _facing(own, way, radius, r0, move):
 def faced(wall, grains, touches, c, i, move):
     """`_facing` of a ball that moves so."""
     rows = touches.wall_rows
-    radius, r0 = grains.place[i, RADIUS], vector_at(rows, c, START)
+    radius, r0 = grains.place[i, col.RADIUS], vector_at(rows, c, col.START)
     own = met(wall, touches.listed, touches.spans, c, radius)
-    return _facing(own, rising(own, r0, rows[c, SIZE], move), radius, r0, move)
+    return _facing(own, rising(own, r0, rows[c, col.SIZE], move), radius, r0, move)
 
 
 @outlined
@@ -109,21 +93,21 @@ def rub_wall(matter, law, wall, grains, touches, number, sweep):
         # One with a mass is moved by the contacts of other balls.
         if not is_heavy(wall) and not is_due(sweep, touches.stirred, i):
             continue
-        radius, ease, w = grains.place[i, RADIUS], rows[c, EASE], vector_at(spin, i, AFTER)
+        radius, ease, w = grains.place[i, col.RADIUS], rows[c, col.EASE], vector_at(spin, i, col.AFTER)
         own = met(wall, touches.listed, touches.spans, c, radius)
         way, v, off = press_at_wall(matter, law, own, grains, rows, (c, i), share)
-        move = vector_at(rows, c, COAST) + half * v
-        n, (_both, last) = _facing(now(own), way, radius, vector_at(rows, c, START), move)
+        move = vector_at(rows, c, col.COAST) + half * v
+        n, (_both, last) = _facing(now(own), way, radius, vector_at(rows, c, col.START), move)
         slip = across(v - last - radius * cross(w, n), n)
-        before = across(vector_at(rows, c, DRAG), n)
-        slipping = ease_across(own, rows, c, ease * (1.0 + ROUNDNESS))
-        new = rubbed(before, slip, slipping, law.friction * rows[c, PUSH])
-        more, part = change_of(OfWall(rows, c), DRAG, new, share)
+        before = across(vector_at(rows, c, col.DRAG), n)
+        slipping = sweep.inverse * ease_across(own, rows, c, ease * (1.0 + ROUNDNESS))
+        new = rubbed(before, slip, slipping, law.friction * rows[c, col.PUSH])
+        more, part = change_of(OfWall(rows, c), col.DRAG, new, share)
         react(own, part)
-        set_vector(speed, i, AFTER, v + part * ease)
-        set_vector(spin, i, AFTER, w - cross(n, part) * (ROUNDNESS * ease / radius))
+        set_vector(speed, i, col.AFTER, v + part * ease)
+        set_vector(spin, i, col.AFTER, w - cross(n, part) * (ROUNDNESS * ease / radius))
         pressed_worst = worse(off, pressed_worst)
-        off = worse(size_of(more) * rows[c, SCALE], off)
+        off = worse(size_of(more) * rows[c, col.SCALE], off)
         stir(sweep, touches.stirred, i, off)
         worst = worse(off, worst)
     return worst, pressed_worst
@@ -137,10 +121,10 @@ def twist_wall(matter, wall, grains, touches, number):
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
+        move = vector_at(rows, c, col.COAST) + half * vector_at(speed, i, col.AFTER)
         n, _velocities = faced(wall, grains, touches, c, i, move)
-        turned = cross(n, vector_at(rows, c, DRAG)) * (ROUNDNESS * rows[c, EASE] / grains.place[i, RADIUS])
-        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) - turned)
+        turned = cross(n, vector_at(rows, c, col.DRAG)) * (ROUNDNESS * rows[c, col.EASE] / grains.place[i, col.RADIUS])
+        set_vector(spin, i, col.AFTER, vector_at(spin, i, col.AFTER) - turned)
 
 
 @outlined
@@ -151,14 +135,14 @@ def book_rubbing(matter, wall, grains, near, touches, books, number):
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        one, drag = index(grains.number[i]), vector_at(rows, c, DRAG)
-        set_vector(near.wall_drag, index(int(rows[c, LISTED])), 0, drag)
-        move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
+        one, drag = index(grains.number[i]), vector_at(rows, c, col.DRAG)
+        set_vector(near.wall_drag, index(int(rows[c, col.LISTED])), 0, drag)
+        move = vector_at(rows, c, col.COAST) + half * vector_at(speed, i, col.AFTER)
         n, (both, _last) = faced(wall, grains, touches, c, i, move)
-        turned = vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER)
-        gained = dot(drag, move) / matter.h - 0.5 * grains.place[i, RADIUS] * dot(cross(n, drag), turned)
+        turned = vector_at(spin, i, col.BEFORE) + vector_at(spin, i, col.AFTER)
+        gained = dot(drag, move) / matter.h - 0.5 * grains.place[i, col.RADIUS] * dot(cross(n, drag), turned)
         given = 0.5 * dot(drag, both)
-        rows[c, RUBBED] = given - gained
+        rows[c, col.RUBBED] = given - gained
         books.dissipated[one] += given - gained
         if gives_work(wall):
             give_work(books, index(number), one, given)

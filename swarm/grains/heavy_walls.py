@@ -24,22 +24,9 @@ from ..surfaces.in_motion.drive import PoseDerivatives
 from ..surfaces.in_motion.moving import Marched, Moving
 from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field, Following, Walls
+from . import grain_arrays as col
 from .contacts import worse
-from .grain_arrays import (
-    AFTER,
-    BEFORE,
-    DRAG,
-    EASE,
-    EASES,
-    IMPULSE,
-    LAST,
-    LOST,
-    Grains,
-    X,
-    grains_of,
-    set_vector,
-    vector_at,
-)
+from .grain_arrays import Grains, grains_of, set_vector, vector_at
 
 
 class FreeMotion(Record):
@@ -65,37 +52,39 @@ class FreeMotion(Record):
     def at_start(self):
         """Its pose at the start of the step."""
         k = index(self.row)
-        return PoseDerivatives(vector_at(self.place, k, X), vector_at(self.speed, k, BEFORE), ZERO, None)
+        return PoseDerivatives(vector_at(self.place, k, col.X), vector_at(self.speed, k, col.BEFORE), ZERO, None)
 
     def at_end(self):
         """Its pose at the end of the step, by the impulses of now."""
         k = index(self.row)
-        return PoseDerivatives(vector_at(self.place, k, X) + self.move(), vector_at(self.speed, k, AFTER), ZERO, None)
+        return PoseDerivatives(
+            vector_at(self.place, k, col.X) + self.move(), vector_at(self.speed, k, col.AFTER), ZERO, None
+        )
 
     def move(self):
         """Its displacement in the step."""
         k = index(self.row)
-        return 0.5 * self.h * (vector_at(self.speed, k, BEFORE) + vector_at(self.speed, k, AFTER))
+        return 0.5 * self.h * (vector_at(self.speed, k, col.BEFORE) + vector_at(self.speed, k, col.AFTER))
 
     def lost(self):
         """What round-off has taken of its displacement."""
-        return vector_at(self.place, index(self.row), LOST)
+        return vector_at(self.place, index(self.row), col.LOST)
 
     def free_velocity(self):
         """Its velocity at the end of a step without contacts."""
         k = index(self.row)
-        v, h = vector_at(self.speed, k, BEFORE), self.h
+        v, h = vector_at(self.speed, k, col.BEFORE), self.h
         gained = ZERO if self.pull is None else h * self.pull
         if self.spring is None:
             return v + gained
         c = 0.25 * h * h * self.spring
-        return ((1.0 - c) * v + (gained - (h * self.spring) * vector_at(self.place, k, X))) / (1.0 + c)
+        return ((1.0 - c) * v + (gained - (h * self.spring) * vector_at(self.place, k, col.X))) / (1.0 + c)
 
     def push(self, impulse):
         """Add an impulse to its velocity at the end of the step."""
         k = index(self.row)
         change = impulse if self.axis is None else dot(impulse, self.axis) * self.axis
-        set_vector(self.speed, k, AFTER, vector_at(self.speed, k, AFTER) + self.lightness * change)
+        set_vector(self.speed, k, col.AFTER, vector_at(self.speed, k, col.AFTER) + self.lightness * change)
 
     def eases(self, n):
         """What a unit impulse along a normal gives it along that, and the most that one across does across."""
@@ -149,7 +138,7 @@ def now(own):
 
 def rest_of(own, place, i):
     """What round-off has taken of the place of a ball against the wall."""
-    lost = vector_at(place, i, LOST)
+    lost = vector_at(place, i, col.LOST)
     return lost - own.drive.lost() if isinstance(own, HeavyWall) else lost
 
 
@@ -161,17 +150,17 @@ def place_on(own, r):
 def note_eases(own, rows, c, n):
     """Note what the wall yields to impulses along and across the normal."""
     if isinstance(own, HeavyWall):
-        rows[c, EASES], rows[c, EASES + 1] = own.drive.eases(n)
+        rows[c, col.EASES], rows[c, col.EASES + 1] = own.drive.eases(n)
 
 
 def ease_along(own, rows, c):
     """The inverse of the mass that moves along the normal."""
-    return rows[c, EASE] + rows[c, EASES] if isinstance(own, HeavyWall) else rows[c, EASE]
+    return rows[c, col.EASE] + rows[c, col.EASES] if isinstance(own, HeavyWall) else rows[c, col.EASE]
 
 
 def ease_across(own, rows, c, ease):
     """The same across the normal, from that of the ball."""
-    return ease + rows[c, EASES + 1] if isinstance(own, HeavyWall) else ease
+    return ease + rows[c, col.EASES + 1] if isinstance(own, HeavyWall) else ease
 
 
 def react(own, impulse):
@@ -189,16 +178,16 @@ def begin_walls(heavy, h):
     place, speed, farthest = heavy.place, heavy.speed, 0.0
     for k in range(place.shape[0]):
         i = index(k)
-        v = vector_at(speed, i, BEFORE)
-        set_vector(speed, i, AFTER, v + vector_at(heavy.change, i, LAST))
-        farthest = worse(square(vector_at(place, i, X) + v * h - vector_at(heavy.listed, i, X)), farthest)
+        v = vector_at(speed, i, col.BEFORE)
+        set_vector(speed, i, col.AFTER, v + vector_at(heavy.change, i, col.LAST))
+        farthest = worse(square(vector_at(place, i, col.X) + v * h - vector_at(heavy.listed, i, col.X)), farthest)
     return farthest
 
 
 def fly_wall(wall):
     """The velocity of a wall with a mass at the end of a step without contacts."""
     drive = _own(wall).drive
-    set_vector(drive.speed, index(drive.row), AFTER, drive.free_velocity())
+    set_vector(drive.speed, index(drive.row), col.AFTER, drive.free_velocity())
 
 
 @outlined
@@ -207,9 +196,9 @@ def push_back(law, wall, touches, number):
     rows, begin, own = touches.wall_rows, touches.wall_spans[0, number], _own(wall)
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
-        impulse = vector_at(rows, c, IMPULSE)
+        impulse = vector_at(rows, c, col.IMPULSE)
         if law.friction is not None:
-            impulse = impulse + vector_at(rows, c, DRAG)
+            impulse = impulse + vector_at(rows, c, col.DRAG)
         react(own, impulse)
 
 
@@ -236,7 +225,7 @@ class WallMotion(NamedTuple):
 
 def motion_of(heavy: Grains) -> WallMotion:
     """The `WallMotion` at the end of a step."""
-    return WallMotion(heavy.place[:, X : X + 3].T, heavy.speed[:, BEFORE : BEFORE + 3].T)  # type: ignore[arg-type]
+    return WallMotion(heavy.place[:, col.X : col.X + 3].T, heavy.speed[:, col.BEFORE : col.BEFORE + 3].T)  # type: ignore[arg-type]
 
 
 def with_heavy(walls: Walls, compiled: CompiledScene, heavy: Grains, h: float) -> Walls:

@@ -13,7 +13,8 @@ import numpy as np
 from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined
 from ..kernel.vector import ZERO, Vec
-from .grain_arrays import BEFORE, LIGHTNESS, set_vector, vector_at
+from . import grain_arrays as col
+from .grain_arrays import set_vector, vector_at
 
 # A step that begins so little of a step earlier begins then.
 _WHOLE = 1e-6
@@ -44,19 +45,19 @@ def velocity_of(held, grains, i):
     one = index(grains.number[i])
     if is_held(held, one):
         return Vec(held.velocity[0, one], held.velocity[1, one], held.velocity[2, one])
-    return vector_at(grains.speed, i, BEFORE)
+    return vector_at(grains.speed, i, col.BEFORE)
 
 
 def hold(held, grains, i, until):
     """Hold a ball from now on until a time [s]."""
-    one, v = index(grains.number[i]), vector_at(grains.speed, i, BEFORE)
-    held.until[one], grains.place[i, LIGHTNESS] = until, 0.0
+    one, v = index(grains.number[i]), vector_at(grains.speed, i, col.BEFORE)
+    held.until[one], grains.place[i, col.LIGHTNESS] = until, 0.0
     held.velocity[0, one], held.velocity[1, one], held.velocity[2, one] = v.x, v.y, v.z
-    set_vector(grains.speed, i, BEFORE, ZERO)
+    set_vector(grains.speed, i, col.BEFORE, ZERO)
     if held.spin is not None:
         for axis in range(3):
-            held.spin[axis, one] = grains.spin[i, BEFORE + axis]
-        set_vector(grains.spin, i, BEFORE, ZERO)
+            held.spin[axis, one] = grains.spin[i, col.BEFORE + axis]
+        set_vector(grains.spin, i, col.BEFORE, ZERO)
 
 
 @outlined
@@ -66,8 +67,8 @@ def let_go(held, grains, now, h):
         i = index(k)
         one = index(grains.number[i])
         if held.until[one] <= now + _WHOLE * h:
-            set_vector(grains.speed, i, BEFORE, velocity_of(held, grains, i))
+            set_vector(grains.speed, i, col.BEFORE, velocity_of(held, grains, i))
             if held.spin is not None:
                 for axis in range(3):
-                    grains.spin[i, BEFORE + axis] = held.spin[axis, one]
-            held.until[one], grains.place[i, LIGHTNESS] = math.nan, 1.0 / held.mass[one]
+                    grains.spin[i, col.BEFORE + axis] = held.spin[axis, one]
+            held.until[one], grains.place[i, col.LIGHTNESS] = math.nan, 1.0 / held.mass[one]

@@ -15,6 +15,7 @@ from ..kernel.arrays import fetch, index, kept, unwritten
 from ..kernel.jit import is_known, outlined, select
 from ..kernel.lines import FOUR, LANES, add_from_lanes, into_lanes
 from ..kernel.vector import Vec, cross, dot, square
+from . import grain_arrays as col
 from .cell import nearest
 from .contacts import (
     ContactSweep,
@@ -31,53 +32,13 @@ from .contacts import (
     worse,
 )
 from .friction import arm_of, rubbed
-from .grain_arrays import (
-    AFTER,
-    ARM,
-    BEFORE,
-    COAST,
-    COLUMNS,
-    COLUMNS_OF_BALLS,
-    COLUMNS_RUBBED,
-    COLUMNS_SWEPT,
-    DAMPING,
-    DRAG,
-    EASE,
-    EASES,
-    ENDS,
-    GAIN,
-    GAP,
-    GIVEN,
-    IMPULSE,
-    KEPT_ROLL,
-    LEVER,
-    LEVERS,
-    LIGHTNESS,
-    LOST,
-    NEARNESS,
-    ONE,
-    OTHER,
-    PLACE,
-    PUSH,
-    RADIUS,
-    ROLL,
-    ROUNDNESS,
-    SCALE,
-    SIZE,
-    START,
-    OfPair,
-    X,
-    set_vector_in,
-    vector_at,
-    vector_in,
-    with_lanes,
-)
+from .grain_arrays import ROUNDNESS, OfPair, set_vector_in, vector_at, vector_in, with_lanes
 
 
 def of_group(touches, g):
     """The rows of the contacts, the first one of a group, the rows of the balls, and the first one of the group."""
     tile = with_lanes(touches.tile)
-    return tile.rows, index(g * COLUMNS), tile.ends, index(g * ENDS)
+    return tile.rows, index(g * col.COLUMNS), tile.ends, index(g * col.ENDS)
 
 
 def balls_of(ends, e, lane):
@@ -88,7 +49,7 @@ def balls_of(ends, e, lane):
 def _fetch_next(rows, q, columns):
     """Ask for so many columns of the next group: those of many balls are not in the second cache."""
     for k in range(columns):
-        fetch(rows, (q + COLUMNS + k) * LANES)
+        fetch(rows, (q + col.COLUMNS + k) * LANES)
 
 
 def _fetch_ball(grains, i):
@@ -102,15 +63,15 @@ def _fetch_ball(grains, i):
 def read_lines(table, ends, e, tile, k):
     """Read all columns of both balls of each contact of a group: those of the second one are behind the others."""
     for n in (0, 1):
-        first = k + n * COLUMNS_OF_BALLS
+        first = k + n * col.COLUMNS_OF_BALLS
         into_lanes(tile, first, table, 0, ends, e + n)
         into_lanes(tile, first + FOUR, table, FOUR, ends, e + n)
 
 
 def read_ends(table, ends, e, tile, k):
     """Read what they have at the end of the step, in four columns from that on."""
-    into_lanes(tile, k, table, AFTER, ends, e)
-    into_lanes(tile, k + FOUR, table, AFTER, ends, e + 1)
+    into_lanes(tile, k, table, col.AFTER, ends, e)
+    into_lanes(tile, k + FOUR, table, col.AFTER, ends, e + 1)
 
 
 def slip_in(tile, k, lane):
@@ -120,8 +81,8 @@ def slip_in(tile, k, lane):
 
 def turning_in(tile, one, other, column, lane):
     """R_i w_i + R_j w_j; in which rows of a tile the columns of both balls begin."""
-    turned = vector_in(tile, one + column, lane) * tile[one + ARM, lane]
-    return turned + vector_in(tile, other + column, lane) * tile[other + ARM, lane]
+    turned = vector_in(tile, one + column, lane) * tile[one + col.ARM, lane]
+    return turned + vector_in(tile, other + column, lane) * tile[other + col.ARM, lane]
 
 
 def pair_at(touches, g, lane):
@@ -132,7 +93,7 @@ def pair_at(touches, g, lane):
 
 def move_in(matter, rows, q, lane, difference):
     """The change of s in a step by that of the velocities at its end."""
-    return vector_in(rows, q + COAST, lane) + 0.5 * matter.h * difference
+    return vector_in(rows, q + col.COAST, lane) + 0.5 * matter.h * difference
 
 
 # --- At the start of a step ------------------------------------------------------------------------------
@@ -152,7 +113,7 @@ def _lay(touches, g, lane, c):
     """Give a contact that has been found a lane."""
     # Nothing of its rows, which are not in the cache yet.
     _rows, _q, ends, e = of_group(touches, g)
-    for k in (ONE, OTHER, PLACE):
+    for k in (col.ONE, col.OTHER, col.PLACE):
         ends[e + k, lane] = touches.found[c, k]
 
 
@@ -167,9 +128,9 @@ def _begin_group(matter, grains, near, touches, group):
     read, (rows, q, ends, e) = unwritten((_READ, LANES), np.float64), of_group(touches, g)
     for k in range(begin, end):
         # Of the second ball in the next group, which has been laid; the first one is often that of this group.
-        _fetch_ball(grains, index(ends[e + ENDS + 1, index(k)]))
+        _fetch_ball(grains, index(ends[e + col.ENDS + 1, index(k)]))
         if near.drag is not None:
-            fetch(near.drag, ends[e + ENDS + PLACE, index(k)] * near.drag.shape[1])
+            fetch(near.drag, ends[e + col.ENDS + col.PLACE, index(k)] * near.drag.shape[1])
     read_lines(grains.place, ends, e, read, _PLACE)
     read_lines(grains.speed, ends, e, read, _SPEED)
     if matter.pairs.friction is not None:
@@ -177,55 +138,55 @@ def _begin_group(matter, grains, near, touches, group):
         into_lanes(read, _TURNS + FOUR, spin, FOUR, ends, e + 1)
     if near.drag is not None:
         for k in range(begin, end):
-            lane, listed = index(k), index(ends[e + PLACE, index(k)])
+            lane, listed = index(k), index(ends[e + col.PLACE, index(k)])
             if matter.pairs.friction is not None:
-                set_vector_in(rows, q + DRAG, lane, vector_at(near.drag, listed, 0))
+                set_vector_in(rows, q + col.DRAG, lane, vector_at(near.drag, listed, 0))
             if matter.pairs.rolling is not None:
-                set_vector_in(rows, q + ROLL, lane, vector_at(near.drag, listed, KEPT_ROLL))
+                set_vector_in(rows, q + col.ROLL, lane, vector_at(near.drag, listed, col.KEPT_ROLL))
     for k in over_lanes(lanes) if is_whole else range(begin, end):
         _begin_contact(matter, rows, q, index(k), read)
-    add_from_lanes(grains.change, GIVEN, ends, e, read, _IMPULSES, lanes)
+    add_from_lanes(grains.change, col.GIVEN, ends, e, read, _IMPULSES, lanes)
     if matter.pairs.friction is not None:
-        add_from_lanes(spin, AFTER, ends, e, read, _TWISTS, lanes)
+        add_from_lanes(spin, col.AFTER, ends, e, read, _TWISTS, lanes)
 
 
 def _begin_contact(matter, rows, q, lane, read):
     """Begin to solve for a contact of a group."""
-    half, one, other = 0.5 * matter.h, _PLACE, _PLACE + COLUMNS_OF_BALLS
-    s0 = nearest(matter.period, vector_in(read, one + X, lane), vector_in(read, other + X, lane))
-    s0 = s0 + (vector_in(read, one + LOST, lane) - vector_in(read, other + LOST, lane))
-    reach = read[one + RADIUS, lane] + read[other + RADIUS, lane]
-    eases = read[one + LIGHTNESS, lane], read[other + LIGHTNESS, lane]
-    one, other = _SPEED, _SPEED + COLUMNS_OF_BALLS
-    v, u = vector_in(read, one + BEFORE, lane), vector_in(read, other + BEFORE, lane)
-    v1, u1 = vector_in(read, one + AFTER, lane), vector_in(read, other + AFTER, lane)
+    half, one, other = 0.5 * matter.h, _PLACE, _PLACE + col.COLUMNS_OF_BALLS
+    s0 = nearest(matter.period, vector_in(read, one + col.X, lane), vector_in(read, other + col.X, lane))
+    s0 = s0 + (vector_in(read, one + col.LOST, lane) - vector_in(read, other + col.LOST, lane))
+    reach = read[one + col.RADIUS, lane] + read[other + col.RADIUS, lane]
+    eases = read[one + col.LIGHTNESS, lane], read[other + col.LIGHTNESS, lane]
+    one, other = _SPEED, _SPEED + col.COLUMNS_OF_BALLS
+    v, u = vector_in(read, one + col.BEFORE, lane), vector_in(read, other + col.BEFORE, lane)
+    v1, u1 = vector_in(read, one + col.AFTER, lane), vector_in(read, other + col.AFTER, lane)
     move = half * ((v + v1) - (u + u1))
     size = math.sqrt(s0.x * s0.x + s0.y * s0.y + s0.z * s0.z)
     gap, ease = reach - size, eases[0] + eases[1]
-    set_vector_in(rows, q + START, lane, s0)
-    rows[q + SIZE, lane], rows[q + GAP, lane], rows[q + EASE, lane] = size, gap, ease
-    rows[q + EASES, lane], rows[q + EASES + 1, lane] = eases
-    set_vector_in(rows, q + COAST, lane, half * (v - u))
+    set_vector_in(rows, q + col.START, lane, s0)
+    rows[q + col.SIZE, lane], rows[q + col.GAP, lane], rows[q + col.EASE, lane] = size, gap, ease
+    rows[q + col.EASES, lane], rows[q + col.EASES + 1, lane] = eases
+    set_vector_in(rows, q + col.COAST, lane, half * (v - u))
     damping = None
     if matter.pairs.damping is not None:
         damping = matter.pairs.damping / math.sqrt(ease) / matter.h
-        rows[q + DAMPING, lane] = damping
+        rows[q + col.DAMPING, lane] = damping
     way = closing(s0, size, move)
     push, gain = begin_solve(pressed(matter, damping, gap, way.change), half * ease)
-    rows[q + PUSH, lane], rows[q + GAIN, lane] = push, gain
-    rows[q + SCALE, lane] = scale_of(matter, push, (size_of(v1 - u1), size_of(v1) + size_of(u1)), ease)
+    rows[q + col.PUSH, lane], rows[q + col.GAIN, lane] = push, gain
+    rows[q + col.SCALE, lane] = scale_of(matter, push, (size_of(v1 - u1), size_of(v1) + size_of(u1)), ease)
     impulse = push * way.along
-    set_vector_in(rows, q + IMPULSE, lane, impulse)
+    set_vector_in(rows, q + col.IMPULSE, lane, impulse)
     if matter.pairs.friction is not None:
-        rows[q + LEVERS, lane] = eases[0] * read[_TURNS + LEVER - FOUR, lane]
-        rows[q + LEVERS + 1, lane] = eases[1] * read[_TURNS + LEVER, lane]
-        rows[q + NEARNESS, lane] = 1.0 / reach
-        drag = vector_in(rows, q + DRAG, lane) * lasting(gap)
-        set_vector_in(rows, q + DRAG, lane, drag)
+        rows[q + col.LEVERS, lane] = eases[0] * read[_TURNS + col.LEVER - FOUR, lane]
+        rows[q + col.LEVERS + 1, lane] = eases[1] * read[_TURNS + col.LEVER, lane]
+        rows[q + col.NEARNESS, lane] = 1.0 / reach
+        drag = vector_in(rows, q + col.DRAG, lane) * lasting(gap)
+        set_vector_in(rows, q + col.DRAG, lane, drag)
         impulse = impulse + drag
         give_twist(rows, q, lane, read, _TWISTS, twist_in(rows, q, lane, move))
     if matter.pairs.rolling is not None:
-        set_vector_in(rows, q + ROLL, lane, vector_in(rows, q + ROLL, lane) * lasting(gap))
+        set_vector_in(rows, q + col.ROLL, lane, vector_in(rows, q + col.ROLL, lane) * lasting(gap))
     give_impulse(rows, q, lane, read, _IMPULSES, impulse)
 
 
@@ -245,7 +206,7 @@ def group_pairs(matter, grains, near, touches, known):
                 parts += 1
                 for k in range(lanes):
                     c = index(first * LANES + k * part + (g - first))
-                    i, j = index(found[c, ONE]), index(found[c, OTHER])
+                    i, j = index(found[c, col.ONE]), index(found[c, col.OTHER])
                     if (marks[i] == parts) | (marks[j] == parts):
                         splits |= 1 << k
                         parts += 1
@@ -301,13 +262,13 @@ def _give(given, k, lane, to_first, to_second):
 
 def give_impulse(rows, q, lane, given, k, impulse):
     """Note what an impulse on the first ball of a contact changes of the velocities of both."""
-    to_second = impulse * rows[q + EASES + 1, lane]
-    _give(given, k, lane, impulse * rows[q + EASES, lane], -1.0 * to_second)
+    to_second = impulse * rows[q + col.EASES + 1, lane]
+    _give(given, k, lane, impulse * rows[q + col.EASES, lane], -1.0 * to_second)
 
 
 def give_twist(rows, q, lane, given, k, twist):
     """Note what a twist changes of the spins of both balls of a contact."""
-    _give(given, k, lane, -1.0 * (twist * rows[q + LEVERS, lane]), -1.0 * (twist * rows[q + LEVERS + 1, lane]))
+    _give(given, k, lane, -1.0 * (twist * rows[q + col.LEVERS, lane]), -1.0 * (twist * rows[q + col.LEVERS + 1, lane]))
 
 
 @outlined
@@ -318,11 +279,11 @@ def push_pairs(matter, grains, touches):
         rows, q, ends, e = of_group(touches, g)
         lanes = touches.lanes[index(g)]
         for k in over_lanes(lanes_between(0, lanes)):
-            impulse = vector_in(rows, q + IMPULSE, index(k))
+            impulse = vector_in(rows, q + col.IMPULSE, index(k))
             if matter.pairs.friction is not None:
-                impulse = impulse + vector_in(rows, q + DRAG, index(k))
+                impulse = impulse + vector_in(rows, q + col.DRAG, index(k))
             give_impulse(rows, q, index(k), given, 0, impulse)
-        add_from_lanes(grains.change, GIVEN, ends, e, given, 0, lanes_between(0, lanes))
+        add_from_lanes(grains.change, col.GIVEN, ends, e, given, 0, lanes_between(0, lanes))
 
 
 @outlined
@@ -336,14 +297,14 @@ def twist_pairs(matter, grains, touches):
         for k in over_lanes(lanes_between(0, lanes)):
             move = move_in(matter, rows, q, index(k), slip_in(begun, _SLIP, index(k)))
             give_twist(rows, q, index(k), given, 0, twist_in(rows, q, index(k), move))
-        add_from_lanes(grains.spin, AFTER, ends, e, given, 0, lanes_between(0, lanes))
+        add_from_lanes(grains.spin, col.AFTER, ends, e, given, 0, lanes_between(0, lanes))
 
 
 def twist_in(rows, q, lane, move):
     """s x J/R of a pair; its s changes by `move`: with all of J, so that no angular momentum is lost at all."""
-    s = vector_in(rows, q + START, lane) + 0.5 * move
-    impulse = vector_in(rows, q + IMPULSE, lane) + vector_in(rows, q + DRAG, lane)
-    return cross(s * rows[q + NEARNESS, lane], impulse)
+    s = vector_in(rows, q + col.START, lane) + 0.5 * move
+    impulse = vector_in(rows, q + col.IMPULSE, lane) + vector_in(rows, q + col.DRAG, lane)
+    return cross(s * rows[q + col.NEARNESS, lane], impulse)
 
 
 # --- Sweeps --------------------------------------------------------------------------------------------
@@ -358,15 +319,15 @@ _PART, _TWIST, _WORST, _PRESSED, _OFF, _GIVEN = 0, 8, 16, 17, 18, 19
 def _press(matter, rows, q, lane, is_due, begun, share):
     """Improve the impulse of a contact of a group, if it is due: its `Closing`, the change, and the error."""
     move = move_in(matter, rows, q, lane, slip_in(begun, _SLIP, lane))
-    way = closing(vector_in(rows, q + START, lane), rows[q + SIZE, lane], move)
-    damping = None if matter.pairs.damping is None else rows[q + DAMPING, lane]
-    wanted, _slope = pressed(matter, damping, rows[q + GAP, lane], way.change)
-    push = improved(rows[q + PUSH, lane], wanted, rows[q + GAIN, lane])
-    old = vector_in(rows, q + IMPULSE, lane)
+    way = closing(vector_in(rows, q + col.START, lane), rows[q + col.SIZE, lane], move)
+    damping = None if matter.pairs.damping is None else rows[q + col.DAMPING, lane]
+    wanted, _slope = pressed(matter, damping, rows[q + col.GAP, lane], way.change)
+    push = improved(rows[q + col.PUSH, lane], wanted, rows[q + col.GAIN, lane])
+    old = vector_in(rows, q + col.IMPULSE, lane)
     more, part = changed(old, push * way.along, share)
-    rows[q + PUSH, lane] = select(is_due, push, kept(rows[q + PUSH, lane]))
-    set_vector_in(rows, q + IMPULSE, lane, old + _if(is_due, part))
-    return way, push, part, weight_of(matter.pairs) * (size_of(more) * rows[q + SCALE, lane])
+    rows[q + col.PUSH, lane] = select(is_due, push, kept(rows[q + col.PUSH, lane]))
+    set_vector_in(rows, q + col.IMPULSE, lane, old + _if(is_due, part))
+    return way, push, part, weight_of(matter.pairs) * (size_of(more) * rows[q + col.SCALE, lane])
 
 
 def _if(is_due, change):
@@ -374,22 +335,22 @@ def _if(is_due, change):
     return Vec(select(is_due, change.x, -0.0), select(is_due, change.y, -0.0), select(is_due, change.z, -0.0))
 
 
-def _rub(matter, rows, q, lane, is_due, begun, given, share):
+def _rub(matter, rows, q, lane, is_due, begun, given, sweep):
     """Improve the impulse and the friction of a contact of a group, if it is due; its error, and that of the first."""
-    way, push, part, off = _press(matter, rows, q, lane, is_due, begun, share)
-    ease, over = rows[q + EASE, lane], 1.0 / square(way.along)
-    arm = arm_of(way, rows[q + SIZE, lane], way.change, rows[q + NEARNESS, lane])
-    turning = turning_in(begun, _TURNING - AFTER, _TURNING + FOUR - AFTER, AFTER, lane)
+    way, push, part, off = _press(matter, rows, q, lane, is_due, begun, sweep.share)
+    ease, over = rows[q + col.EASE, lane], 1.0 / square(way.along)
+    arm = arm_of(way, rows[q + col.SIZE, lane], way.change, rows[q + col.NEARNESS, lane])
+    turning = turning_in(begun, _TURNING - col.AFTER, _TURNING + FOUR - col.AFTER, col.AFTER, lane)
     slip = slip_in(begun, _SLIP, lane) + ease * part - cross(turning, arm)
     slip = slip - (dot(slip, way.along) * over) * way.along
-    old = vector_in(rows, q + DRAG, lane)
+    old = vector_in(rows, q + col.DRAG, lane)
     before = old - (dot(old, way.along) * over) * way.along
-    new = rubbed(before, slip, ease * (1.0 + ROUNDNESS * square(arm)), matter.pairs.friction * push)
-    more, rub = changed(old, new, share)
-    set_vector_in(rows, q + DRAG, lane, old + _if(is_due, rub))
+    new = rubbed(before, slip, sweep.inverse * (ease * (1.0 + ROUNDNESS * square(arm))), matter.pairs.friction * push)
+    more, rub = changed(old, new, sweep.share)
+    set_vector_in(rows, q + col.DRAG, lane, old + _if(is_due, rub))
     give_impulse(rows, q, lane, given, _PART, part + rub)
     give_twist(rows, q, lane, given, _TWIST, cross(arm, rub))
-    return worse(size_of(more) * rows[q + SCALE, lane], off), off
+    return worse(size_of(more) * rows[q + col.SCALE, lane], off), off
 
 
 def _note_worst(given, k, lane, is_due, off):
@@ -403,13 +364,13 @@ def _sweep_group(matter, grains, touches, group, arrays, sweep):
     (g, lanes), (begun, given) = group, arrays
     rows, q, ends, e = of_group(touches, g)
     read_ends(grains.speed, ends, e, begun, _SLIP)
-    _fetch_next(rows, q, COLUMNS_SWEPT)
+    _fetch_next(rows, q, col.COLUMNS_SWEPT)
     for k in over_lanes(lanes):
         lane, is_due = index(k), is_in(lanes, k)
         _way, _push, part, off = _press(matter, rows, q, lane, is_due, begun, sweep.share)
         give_impulse(rows, q, lane, given, _PART, part)
         _note_worst(given, _WORST, lane, is_due, off)
-    add_from_lanes(grains.speed, AFTER, ends, e, given, _PART, lanes)
+    add_from_lanes(grains.speed, col.AFTER, ends, e, given, _PART, lanes)
 
 
 def _rub_group(matter, grains, touches, group, arrays, sweep):
@@ -418,17 +379,17 @@ def _rub_group(matter, grains, touches, group, arrays, sweep):
     rows, q, ends, e = of_group(touches, g)
     read_ends(grains.speed, ends, e, begun, _SLIP)
     read_ends(grains.spin, ends, e, begun, _TURNING)
-    _fetch_next(rows, q, COLUMNS_RUBBED)
+    _fetch_next(rows, q, col.COLUMNS_RUBBED)
     unsolved = 0
     for k in over_lanes(lanes):
         lane, is_due = index(k), is_in(lanes, k)
-        off, pressed_off = _rub(matter, rows, q, lane, is_due, begun, given, sweep.share)
+        off, pressed_off = _rub(matter, rows, q, lane, is_due, begun, given, sweep)
         given[_OFF, lane] = off
         _note_worst(given, _WORST, lane, is_due, off)
         _note_worst(given, _PRESSED, lane, is_due, pressed_off)
         unsolved |= select(off <= sweep.solved, 0, 1) << k
-    add_from_lanes(grains.speed, AFTER, ends, e, given, _PART, lanes)
-    add_from_lanes(grains.spin, AFTER, ends, e, given, _TWIST, lanes)
+    add_from_lanes(grains.speed, col.AFTER, ends, e, given, _PART, lanes)
+    add_from_lanes(grains.spin, col.AFTER, ends, e, given, _TWIST, lanes)
     unsolved &= lanes
     if unsolved != 0:
         for k in range(LANES):
@@ -492,7 +453,7 @@ def _over_groups(one, lanes_of, matter, grains, touches, sweep):
 @outlined
 def sweep_pairs(matter, grains, touches, share):
     """Improve the impulse of each pair; the largest change of one, relative to what moves there."""
-    worst, _pressed = _over_groups(_sweep_group, _all_lanes, matter, grains, touches, ContactSweep(0, share, 0.0))
+    worst, _pressed = _over_groups(_sweep_group, _all_lanes, matter, grains, touches, ContactSweep(0, share, 0.0, 1.0))
     return worst
 
 

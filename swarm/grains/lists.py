@@ -15,8 +15,9 @@ from ..kernel.vector import square
 from ..surfaces.balls.joined_faces import JoinedFaces
 from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field
+from . import grain_arrays as col
 from .cell import nearest
-from .grain_arrays import FACE, RADIUS, X, set_vector, vector_at
+from .grain_arrays import set_vector, vector_at
 from .heavy_walls import is_heavy
 from .vessel import list_in_field
 
@@ -76,11 +77,11 @@ def _is_again(cells, k, step):
 def _list_between(period, grains, near, span, i, found):
     """List the pairs of ball i with those after it between two places; how many are listed then."""
     place, (begin, end, skin) = grains.place, span
-    here, radius = vector_at(place, i, X), place[i, RADIUS]
+    here, radius = vector_at(place, i, col.X), place[i, col.RADIUS]
     for k in range(begin, end):
         j = index(k)
-        s = nearest(period, here, vector_at(place, j, X))
-        reach = radius + place[j, RADIUS] + skin
+        s = nearest(period, here, vector_at(place, j, col.X))
+        reach = radius + place[j, col.RADIUS] + skin
         if square(s) < reach * reach:
             if found < near.mate.size:
                 near.mate[index(found)] = k
@@ -140,11 +141,11 @@ def _list_at_wall(wall, grains, near, skin, found):
     place, always = grains.place, isinstance(wall, Posed) and not is_heavy(wall)
     for k in range(place.shape[0]):
         i = index(k)
-        if always or _depth(wall.grown(place[i, RADIUS]), vector_at(place, i, X)) > -2.0 * skin:
+        if always or _depth(wall.grown(place[i, col.RADIUS]), vector_at(place, i, col.X)) > -2.0 * skin:
             if found < near.slot.size:
                 near.slot[index(found)] = k
                 if near.spans is not None:
-                    near.spans[index(found), FACE] = 0
+                    near.spans[index(found), col.FACE] = 0
             found += 1
     return found
 
@@ -167,5 +168,5 @@ def list_walls(walls, faces, grains, near, skin, remaining):
     near.wall_first[len(walls.each)] = found
     for k in range(grains.place.shape[0]):
         i = index(k)
-        set_vector(grains.listed, i, 0, vector_at(grains.place, i, X))
+        set_vector(grains.listed, i, 0, vector_at(grains.place, i, col.X))
     return found

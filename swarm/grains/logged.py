@@ -12,31 +12,11 @@ from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, norm
 from ..lanes.watching.log import Lasted, Log, Struck
 from ..surfaces.periodic.period import into
+from . import grain_arrays as col
 from .at_walls import rising
 from .contacts import closing
 from .friction import across, faced
-from .grain_arrays import (
-    AFTER,
-    ARRIVED,
-    BEFORE,
-    BEGAN,
-    COAST,
-    FORCE,
-    GAP,
-    IMPULSE,
-    LISTED,
-    PRESSED,
-    RADIUS,
-    RUBBED,
-    SIZE,
-    SLIP,
-    START,
-    TAKEN_OFF,
-    OfWall,
-    X,
-    set_vector,
-    vector_at,
-)
+from .grain_arrays import OfWall, set_vector, vector_at
 from .held import velocity_of
 from .lanes_of_pairs import move_in, pair_at
 from .vessel import met, met_member
@@ -53,17 +33,17 @@ class Noting(NamedTuple):
 
 def _note(matter, rubs, contact, kept, time):
     """Add a step that ends at a time [s] to what is noted of a contact; whether that begins in it."""
-    gap, k = contact.number(GAP), contact.listed()
+    gap, k = contact.number(col.GAP), contact.listed()
     # The second one at the start of the run.
-    begins = (gap <= 0.0) | (kept[k, PRESSED] == 0.0)
+    begins = (gap <= 0.0) | (kept[k, col.PRESSED] == 0.0)
     if begins:
-        kept[k, BEGAN] = time - matter.h
-        kept[k, PRESSED] = kept[k, FORCE] = kept[k, TAKEN_OFF] = 0.0
-    impulse = norm(contact.vector(IMPULSE))
-    kept[k, PRESSED] += impulse
-    kept[k, FORCE] = max(kept[k, FORCE], impulse / matter.h)
+        kept[k, col.BEGAN] = time - matter.h
+        kept[k, col.PRESSED] = kept[k, col.FORCE] = kept[k, col.TAKEN_OFF] = 0.0
+    impulse = norm(contact.vector(col.IMPULSE))
+    kept[k, col.PRESSED] += impulse
+    kept[k, col.FORCE] = max(kept[k, col.FORCE], impulse / matter.h)
     if rubs:
-        kept[k, TAKEN_OFF] += contact.number(RUBBED)
+        kept[k, col.TAKEN_OFF] += contact.number(col.RUBBED)
     return begins
 
 
@@ -75,7 +55,7 @@ def note_pairs(matter, grains, near, touches, time):
             contact, (i, j) = pair_at(touches, g, index(k))
             if _note(matter, matter.pairs.friction is not None, contact, near.drag, time):
                 first, place = i if grains.number[i] < grains.number[j] else j, contact.listed()
-                set_vector(near.drag, place, ARRIVED, vector_at(grains.speed, first, BEFORE))
+                set_vector(near.drag, place, col.ARRIVED, vector_at(grains.speed, first, col.BEFORE))
 
 
 @outlined
@@ -87,20 +67,20 @@ def note_wall(matter, law, wall, grains, near, touches, noting, given):
         c = index(k)
         i = index(touches.wall_ends[c])
         if _note(matter, law.friction is not None, OfWall(rows, c), near.wall_drag, time):
-            place, v = index(int(rows[c, LISTED])), vector_at(speed, i, BEFORE)
-            set_vector(near.wall_drag, place, ARRIVED, v)
+            place, v = index(int(rows[c, col.LISTED])), vector_at(speed, i, col.BEFORE)
+            set_vector(near.wall_drag, place, col.ARRIVED, v)
             if noting.log.slip is not None:
-                move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
+                move = vector_at(rows, c, col.COAST) + half * vector_at(speed, i, col.AFTER)
                 n, (both, _last) = faced(wall, grains, touches, c, i, move)
-                set_vector(near.wall_drag, place, SLIP, across(v - 0.5 * both, n))
+                set_vector(near.wall_drag, place, col.SLIP, across(v - 0.5 * both, n))
 
 
 def _row(noting, at, kept, k, time, slip):
     """A row of a contact with what is noted in row k; `at` is a `Struck` without it, in no cell."""
-    lasted = Lasted(time - kept[k, BEGAN], kept[k, FORCE], kept[k, TAKEN_OFF])
+    lasted = Lasted(time - kept[k, col.BEGAN], kept[k, col.FORCE], kept[k, col.TAKEN_OFF])
     back = into(noting.period, at.r)
     struck = at._replace(
-        r=back.r, before=vector_at(kept, k, ARRIVED), impulse=kept[k, PRESSED], slip=slip, lasted=lasted
+        r=back.r, before=vector_at(kept, k, col.ARRIVED), impulse=kept[k, col.PRESSED], slip=slip, lasted=lasted
     )
     noting.log.ended(noting.image, struck, back.images)
 
@@ -113,13 +93,13 @@ def log_pairs(matter, world, time):
     for g in range(touches.used[1]):
         for k in range(touches.lanes[index(g)]):
             contact, (i, j) = pair_at(touches, g, index(k))
-            gap, difference = contact.number(GAP), vector_at(speed, i, AFTER) - vector_at(speed, j, AFTER)
+            gap, difference = contact.number(col.GAP), vector_at(speed, i, col.AFTER) - vector_at(speed, j, col.AFTER)
             move = move_in(matter, contact.rows, contact.q, contact.lane, difference)
-            way = closing(contact.vector(START), contact.number(SIZE), move)
+            way = closing(contact.vector(col.START), contact.number(col.SIZE), move)
             if (gap > 0.0) & (gap + way.change <= 0.0):
                 if grains.number[i] > grains.number[j]:
                     i, j = j, i
-                r, v = vector_at(grains.place, i, X), velocity_of(world.held, grains, i)
+                r, v = vector_at(grains.place, i, col.X), velocity_of(world.held, grains, i)
                 at = Struck(grains.number[i], -1.0, time, r, v, v, 0.0, partner=grains.number[j])
                 _row(noting, at, near.drag, contact.listed(), time, ZERO)
 
@@ -132,15 +112,15 @@ def log_wall(matter, wall, world, given):
     begin = touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
-        if rows[c, GAP] > 0.0:
+        if rows[c, col.GAP] > 0.0:
             i = index(touches.wall_ends[c])
-            radius = grains.place[i, RADIUS]
-            move = vector_at(rows, c, COAST) + half * vector_at(speed, i, AFTER)
+            radius = grains.place[i, col.RADIUS]
+            move = vector_at(rows, c, col.COAST) + half * vector_at(speed, i, col.AFTER)
             own = met(wall, touches.listed, touches.spans, c, radius)
-            if rows[c, GAP] + rising(own, vector_at(rows, c, START), rows[c, SIZE], move).change <= 0.0:
-                r, v = vector_at(grains.place, i, X), velocity_of(world.held, grains, i)
+            if rows[c, col.GAP] + rising(own, vector_at(rows, c, col.START), rows[c, col.SIZE], move).change <= 0.0:
+                r, v = vector_at(grains.place, i, col.X), velocity_of(world.held, grains, i)
                 member = noting.places[number][index(met_member(wall, touches.listed, touches.spans, c, radius, r))]
-                place = index(int(rows[c, LISTED]))
-                slip = ZERO if noting.log.slip is None else vector_at(near.wall_drag, place, SLIP)
+                place = index(int(rows[c, col.LISTED]))
+                slip = ZERO if noting.log.slip is None else vector_at(near.wall_drag, place, col.SLIP)
                 at = Struck(grains.number[i], float(member), time, r, v, v, 0.0)
                 _row(noting, at, near.wall_drag, place, time, slip)

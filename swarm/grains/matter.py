@@ -42,6 +42,7 @@ def matter_of(compiled: CompiledScene, method: Method, radius: NDArray[np.float6
         None if scene.period is None else Lengths(*scene.period),
         _limits(float(radius.min()), longest_step(scene, dt, balls=True)),
         compiled.openings(),
+        slips=method.friction_tolerance,  # type: ignore[attr-defined]
     )
 
 

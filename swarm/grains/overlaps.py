@@ -19,8 +19,9 @@ from ..surfaces.balls.rounded import part_within
 from ..surfaces.fields.members import member
 from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
+from . import grain_arrays as col
 from .contacts import apart
-from .grain_arrays import AFTER, BEFORE, BEGIN, END, RADIUS, X, vector_at
+from .grain_arrays import vector_at
 from .heavy_walls import is_heavy, now
 from .vessel import is_of_faces, met, moves
 
@@ -39,7 +40,7 @@ class Limits(Record):
 
 def move_of(matter, grains, i):
     """The move of a ball in the step."""
-    return 0.5 * matter.h * (vector_at(grains.speed, i, BEFORE) + vector_at(grains.speed, i, AFTER))
+    return 0.5 * matter.h * (vector_at(grains.speed, i, col.BEFORE) + vector_at(grains.speed, i, col.AFTER))
 
 
 def _note(failed, ball, other, wall, size):
@@ -56,7 +57,7 @@ def look_at_pairs(matter, grains, near, failed):
         for k in range(near.first[i], near.first[i + 1]):
             j = index(near.mate[index(k)])
             s, move = apart(matter, place, i, j), mine - move_of(matter, grains, j)
-            reach, least = place[i, RADIUS] + place[j, RADIUS], min(place[i, RADIUS], place[j, RADIUS])
+            reach, least = place[i, col.RADIUS] + place[j, col.RADIUS], min(place[i, col.RADIUS], place[j, col.RADIUS])
             overlap = reach - norm(s + part_within(-1.0 * s, move) * move)
             if overlap > deepest:
                 is_long = square(move) > reach * reach
@@ -77,7 +78,7 @@ def _passed(face, r, move):
 def _passed_any(wall, near, k, r, move):
     """The same of all that are listed in row k."""
     most = -1.0
-    for m in range(near.spans[k, BEGIN], near.spans[k, END]):
+    for m in range(near.spans[k, col.BEGIN], near.spans[k, col.END]):
         most = max(most, _passed(member(members_of(wall.members), index(near.listed[index(m)])), r, move))
     return most
 
@@ -91,7 +92,7 @@ def look_at_wall(matter, wall, grains, near, failed, number):
         if near.wall_is_open is not None and near.wall_is_open[c]:
             continue
         i = index(near.slot[c])
-        r, move, radius = vector_at(place, i, X), move_of(matter, grains, i), place[i, RADIUS]
+        r, move, radius = vector_at(place, i, col.X), move_of(matter, grains, i), place[i, col.RADIUS]
         own = met(wall, near.listed, near.spans, c, radius)
         overlap = max(own.gap_of(own.inner(r)), own.gap_of(own.end_inner(r + move)))
         if isinstance(wall, Field) and moves(wall):

@@ -6,7 +6,8 @@ from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined
 from ..lanes.watching.crossings import ParticleMoment
 from ..surfaces.periodic.period import has_left, into
-from .grain_arrays import AFTER, BEFORE, X, vector_at
+from . import grain_arrays as col
+from .grain_arrays import vector_at
 from .overlaps import move_of
 
 
@@ -27,10 +28,10 @@ def count_moves(matter, grains, followed):
         i = index(k)
         p, move = index(grains.number[i]), move_of(matter, grains, i)
         # Between two lists a centre may be a little outside the cell.
-        here = into(period, vector_at(grains.place, i, X))
+        here = into(period, vector_at(grains.place, i, col.X))
         r = here.r
-        before = ParticleMoment(r, vector_at(grains.speed, i, BEFORE), matter.h)
-        after = ParticleMoment(r + move, vector_at(grains.speed, i, AFTER), 0.0)
+        before = ParticleMoment(r, vector_at(grains.speed, i, col.BEFORE), matter.h)
+        after = ParticleMoment(r + move, vector_at(grains.speed, i, col.AFTER), 0.0)
         if log is not None:
             first = index(log.filled[0])
         matter.counters.count_step(followed, p, before, after)

@@ -11,8 +11,9 @@ from ..kernel.limits import TINY
 from ..kernel.vector import dot, norm, square
 from ..methods import Penalty
 from ..pairs import MOST_PRESSED
+from . import grain_arrays as col
 from .contacts import apart
-from .grain_arrays import AFTER, BEFORE, LIGHTNESS, RADIUS, X, vector_at
+from .grain_arrays import vector_at
 from .overlaps import BALL, OTHER, SIZE, WALL
 
 
@@ -42,7 +43,7 @@ def _fastest(rows: Any) -> tuple[float, int]:
     if not len(rows.number):
         return 0.0, -1
     speed = rows.speed
-    squares = (speed[:, BEFORE : BEFORE + 3] ** 2 + speed[:, AFTER : AFTER + 3] ** 2).sum(axis=1)
+    squares = (speed[:, col.BEFORE : col.BEFORE + 3] ** 2 + speed[:, col.AFTER : col.AFTER + 3] ** 2).sum(axis=1)
     squares = np.where(np.isnan(squares), np.inf, squares)
     k = int(np.argmax(squares))
     return float(squares[k]), int(rows.number[k])
@@ -62,13 +63,13 @@ def passed(compiled: CompiledScene, method: Penalty, matter: Any, world: Any, st
     """Of a ball that passes the surface of another one, or of a wall, in the step at a moment [s]."""
     grains, failed = world.grains, world.books.failed
     i, j, wall = (int(failed[k]) for k in (BALL, OTHER, WALL))
-    size, where = float(failed[SIZE]), ", ".join(f"{x:.6g}" for x in grains.place[i, X : X + 3])
+    size, where = float(failed[SIZE]), ", ".join(f"{x:.6g}" for x in grains.place[i, col.X : col.X + 3])
     met = f"particle {grains.number[j]}"
     if wall >= 0:
         surface = compiled.numbering.surfaces_of_rows[wall]
         met = f"surfaces[{surface}] ({type(compiled.scene.surfaces[surface]).__name__})"
     begin = f"the step at {moment:.9g} s failed at particle {grains.number[i]}, at ({where}) m: it "
-    radii = [grains.place[k, RADIUS] for k in (i, j)[: 1 + (wall < 0)]]
+    radii = [grains.place[k, col.RADIUS] for k in (i, j)[: 1 + (wall < 0)]]
     if status == Status.TOO_FAST:
         reach = sum(radii) if wall < 0 else matter.limits.longest
         room = f"their radii are {reach:.3g} m in all" if wall < 0 else f"the thinnest solid is {reach:.3g} m thick"
@@ -89,12 +90,12 @@ def _penalty(method: Penalty, matter: Any, grains: Any, ends: tuple[int, int], o
     """The penalty with which a contact would overlap by what is allowed [m], by its energy at the start of the step."""
     i, j = ends
     place, speed = grains.place, grains.speed
-    stored, v, ease = matter.law.stored_energy(overlap), vector_at(speed, i, BEFORE), place[i, LIGHTNESS]
+    stored, v, ease = matter.law.stored_energy(overlap), vector_at(speed, i, col.BEFORE), place[i, col.LIGHTNESS]
     if j >= 0:
         s = apart(matter, place, i, j)
-        stored = matter.law.stored_energy(place[i, RADIUS] + place[j, RADIUS] - norm(s))
+        stored = matter.law.stored_energy(place[i, col.RADIUS] + place[j, col.RADIUS] - norm(s))
         # Along the line of the centres.
-        v = dot(v - vector_at(speed, j, BEFORE), s) / max(square(s), TINY) * s
-        ease += place[j, LIGHTNESS]
+        v = dot(v - vector_at(speed, j, col.BEFORE), s) / max(square(s), TINY) * s
+        ease += place[j, col.LIGHTNESS]
     energy = stored + 0.5 * square(v) / ease
     return float((method.exponent + 1.0) * energy / math.pow(allowed, method.exponent + 1.0))

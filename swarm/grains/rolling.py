@@ -12,47 +12,32 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.vector import ZERO, dot, square
 from ..surfaces.in_motion.posed import Posed
+from . import grain_arrays as col
 from .contacts import change_of, size_of, stir, worse
 from .friction import across, rubbed
-from .grain_arrays import (
-    AFTER,
-    BEFORE,
-    IMPULSE,
-    KEPT_ROLL,
-    LIGHTNESS,
-    LISTED,
-    PUSH,
-    RADIUS,
-    ROLL,
-    ROUNDNESS,
-    RUBBED,
-    SCALE,
-    OfWall,
-    set_vector,
-    vector_at,
-)
+from .grain_arrays import ROUNDNESS, OfWall, set_vector, vector_at
 from .lanes_of_pairs import pair_at
 from .vessel import gives_work, met
 
 
 def _ease(place, i):
     """1/I of a ball."""
-    return ROUNDNESS * place[i, LIGHTNESS] / (place[i, RADIUS] * place[i, RADIUS])
+    return ROUNDNESS * place[i, col.LIGHTNESS] / (place[i, col.RADIUS] * place[i, col.RADIUS])
 
 
-def _resist(contact, rolling, sizes, share):
+def _resist(contact, rolling, sizes, sweep):
     """The change of the angular impulse of a contact, and the error: of the rolling at the end of the step.
 
     `sizes` are the radius R and 1/I.
     """
-    (radius, ease), n, roll = sizes, contact.vector(IMPULSE), contact.vector(ROLL)
+    (radius, ease), n, roll = sizes, contact.vector(col.IMPULSE), contact.vector(col.ROLL)
     if not square(n) > 0.0:
-        contact.set_vector(ROLL, ZERO)
+        contact.set_vector(col.ROLL, ZERO)
         return -1.0 * roll, 0.0
-    limit = rolling[1] * radius * contact.number(PUSH)
-    new = rubbed(across(roll, n), across(rolling[0], n), ease, limit)
-    more, part = change_of(contact, ROLL, new, share)
-    return part, size_of(more * (1.0 / radius)) * contact.number(SCALE)
+    limit = rolling[1] * radius * contact.number(col.PUSH)
+    new = rubbed(across(roll, n), across(rolling[0], n), sweep.inverse * ease, limit)
+    more, part = change_of(contact, col.ROLL, new, sweep.share)
+    return part, size_of(more * (1.0 / radius)) * contact.number(col.SCALE)
 
 
 # --- Of pairs --------------------------------------------------------------------------------------------
@@ -65,12 +50,13 @@ def roll_pairs(matter, grains, touches, sweep):
     for g in range(touches.used[1]):
         for k in range(touches.lanes[index(g)]):
             contact, (i, j) = pair_at(touches, g, index(k))
-            w, u, one, two = vector_at(spin, i, AFTER), vector_at(spin, j, AFTER), _ease(place, i), _ease(place, j)
-            radius = place[i, RADIUS] * place[j, RADIUS] / (place[i, RADIUS] + place[j, RADIUS])
+            w, u = vector_at(spin, i, col.AFTER), vector_at(spin, j, col.AFTER)
+            one, two = _ease(place, i), _ease(place, j)
+            radius = place[i, col.RADIUS] * place[j, col.RADIUS] / (place[i, col.RADIUS] + place[j, col.RADIUS])
             rolling = w - u, matter.pairs.rolling
-            part, off = _resist(contact, rolling, (radius, one + two), sweep.share)
-            set_vector(spin, i, AFTER, w + part * one)
-            set_vector(spin, j, AFTER, u - part * two)
+            part, off = _resist(contact, rolling, (radius, one + two), sweep)
+            set_vector(spin, i, col.AFTER, w + part * one)
+            set_vector(spin, j, col.AFTER, u - part * two)
             stir(sweep, touches.stirred, i, off)
             stir(sweep, touches.stirred, j, off)
             worst = worse(off, worst)
@@ -84,9 +70,9 @@ def turn_pairs(grains, touches):
     for g in range(touches.used[1]):
         for k in range(touches.lanes[index(g)]):
             contact, (i, j) = pair_at(touches, g, index(k))
-            roll = contact.vector(ROLL)
-            set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) + roll * _ease(place, i))
-            set_vector(spin, j, AFTER, vector_at(spin, j, AFTER) - roll * _ease(place, j))
+            roll = contact.vector(col.ROLL)
+            set_vector(spin, i, col.AFTER, vector_at(spin, i, col.AFTER) + roll * _ease(place, i))
+            set_vector(spin, j, col.AFTER, vector_at(spin, j, col.AFTER) - roll * _ease(place, j))
 
 
 @outlined
@@ -96,12 +82,12 @@ def book_rolling_pairs(grains, near, touches, books):
     for g in range(touches.used[1]):
         for k in range(touches.lanes[index(g)]):
             contact, (i, j) = pair_at(touches, g, index(k))
-            roll = contact.vector(ROLL)
-            set_vector(near.drag, contact.listed(), KEPT_ROLL, roll)
-            turned = vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER)
-            turned = turned - (vector_at(spin, j, BEFORE) + vector_at(spin, j, AFTER))
+            roll = contact.vector(col.ROLL)
+            set_vector(near.drag, contact.listed(), col.KEPT_ROLL, roll)
+            turned = vector_at(spin, i, col.BEFORE) + vector_at(spin, i, col.AFTER)
+            turned = turned - (vector_at(spin, j, col.BEFORE) + vector_at(spin, j, col.AFTER))
             lost = -0.25 * dot(roll, turned)
-            contact.rows[contact.q + RUBBED, contact.lane] += 2.0 * lost
+            contact.rows[contact.q + col.RUBBED, contact.lane] += 2.0 * lost
             books.dissipated[index(grains.number[i])] += lost
             books.dissipated[index(grains.number[j])] += lost
 
@@ -111,7 +97,7 @@ def book_rolling_pairs(grains, near, touches, books):
 
 def _spin_of(wall, grains, touches, c, i):
     """The angular velocity of the wall at a contact."""
-    own = met(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS])
+    own = met(wall, touches.listed, touches.spans, c, grains.place[i, col.RADIUS])
     return own.drive.spin if isinstance(own, Posed) and own.drive.spin is not None else ZERO
 
 
@@ -122,10 +108,10 @@ def roll_wall(law, wall, grains, touches, number, sweep):
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        w, ease = vector_at(spin, i, AFTER), _ease(place, i)
+        w, ease = vector_at(spin, i, col.AFTER), _ease(place, i)
         rolling = w - _spin_of(wall, grains, touches, c, i), law.rolling
-        part, off = _resist(OfWall(rows, c), rolling, (place[i, RADIUS], ease), sweep.share)
-        set_vector(spin, i, AFTER, w + part * ease)
+        part, off = _resist(OfWall(rows, c), rolling, (place[i, col.RADIUS], ease), sweep)
+        set_vector(spin, i, col.AFTER, w + part * ease)
         stir(sweep, touches.stirred, i, off)
         worst = worse(off, worst)
     return worst
@@ -138,7 +124,8 @@ def turn_wall(grains, touches, number):
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        set_vector(spin, i, AFTER, vector_at(spin, i, AFTER) + vector_at(rows, c, ROLL) * _ease(grains.place, i))
+        turned = vector_at(rows, c, col.ROLL) * _ease(grains.place, i)
+        set_vector(spin, i, col.AFTER, vector_at(spin, i, col.AFTER) + turned)
 
 
 @outlined
@@ -148,11 +135,11 @@ def book_rolling(wall, grains, near, touches, books, number):
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        one, roll = index(grains.number[i]), vector_at(rows, c, ROLL)
-        set_vector(near.wall_drag, index(int(rows[c, LISTED])), KEPT_ROLL, roll)
-        gained = 0.5 * dot(roll, vector_at(spin, i, BEFORE) + vector_at(spin, i, AFTER))
+        one, roll = index(grains.number[i]), vector_at(rows, c, col.ROLL)
+        set_vector(near.wall_drag, index(int(rows[c, col.LISTED])), col.KEPT_ROLL, roll)
+        gained = 0.5 * dot(roll, vector_at(spin, i, col.BEFORE) + vector_at(spin, i, col.AFTER))
         given = dot(roll, _spin_of(wall, grains, touches, c, i))
-        rows[c, RUBBED] += given - gained
+        rows[c, col.RUBBED] += given - gained
         books.dissipated[one] += given - gained
         if gives_work(wall):
             give_work(books, index(number), one, given)

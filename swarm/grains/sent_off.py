@@ -18,22 +18,9 @@ from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, square
 from ..surfaces.in_motion.posed import Posed
+from . import grain_arrays as col
 from .at_walls import rising
-from .grain_arrays import (
-    AFTER,
-    BEFORE,
-    COAST,
-    GAP,
-    LIGHTNESS,
-    LISTED,
-    PRESSED,
-    RADIUS,
-    SIZE,
-    START,
-    X,
-    set_vector,
-    vector_at,
-)
+from .grain_arrays import set_vector, vector_at
 from .held import hold
 from .overlaps import BALL, WALL
 from .vessel import gives_work, met, met_member
@@ -72,11 +59,11 @@ def send_off(matter, wall, world, given_time):
     rows, begin, half, status = touches.wall_rows, touches.wall_spans[0, number], 0.5 * matter.h, Status.DONE.value
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
-        i, gap = index(touches.wall_ends[c]), rows[c, GAP]
+        i, gap = index(touches.wall_ends[c]), rows[c, col.GAP]
         if gap > 0.0:
-            own = met(wall, touches.listed, touches.spans, c, grains.place[i, RADIUS])
-            move = vector_at(rows, c, COAST) + half * vector_at(grains.speed, i, AFTER)
-            if gap + rising(own, vector_at(rows, c, START), rows[c, SIZE], move).change <= 0.0:
+            own = met(wall, touches.listed, touches.spans, c, grains.place[i, col.RADIUS])
+            move = vector_at(rows, c, col.COAST) + half * vector_at(grains.speed, i, col.AFTER)
+            if gap + rising(own, vector_at(rows, c, col.START), rows[c, col.SIZE], move).change <= 0.0:
                 after = own._replace(pose=own.end) if isinstance(own, Posed) else own
                 one = _act(wall, after, world, (number, c, i), time)
                 status = one if status == Status.DONE or one == Status.SENT_WRONG else status
@@ -86,7 +73,8 @@ def send_off(matter, wall, world, given_time):
 def _act(wall, own, world, at, time):
     """Let the laws of a wall act on a ball."""
     (number, c, i), grains, books, sender = at, world.grains, world.books, world.sender
-    r, radius, v = vector_at(grains.place, i, X), grains.place[i, RADIUS], vector_at(grains.speed, i, BEFORE)
+    place, v = grains.place, vector_at(grains.speed, i, col.BEFORE)
+    r, radius = vector_at(place, i, col.X), place[i, col.RADIUS]
     # Some normals are of length 1 on the wall alone, and the contact has ended a little off it.
     n, u = own.unit_normal(r), None
     n = n * (1.0 / math.sqrt(square(n)))
@@ -100,7 +88,7 @@ def _act(wall, own, world, at, time):
     member = sender.places[number][index(met_member(wall, touches.listed, touches.spans, c, radius, r))]
     random = sender.source.of_impact(one, books.ended[one], sender.laws)
     books.ended[one] += 1
-    before, mass = v + 2.0 * away * n, 1.0 / grains.place[i, LIGHTNESS]
+    before, mass = v + 2.0 * away * n, 1.0 / grains.place[i, col.LIGHTNESS]
     arriving = Arriving(r, before, square(before), mass)
     happens, bounce = by_law(sender.laws, _Facing(n, u), None, float(member), arriving, random)
     if not happens:
@@ -108,12 +96,12 @@ def _act(wall, own, world, at, time):
     if math.isnan(bounce.v.x):
         books.failed[BALL], books.failed[WALL] = i, number
         return Status.SENT_WRONG.value
-    set_vector(grains.speed, i, BEFORE, bounce.v)
+    set_vector(grains.speed, i, col.BEFORE, bounce.v)
     row = index(number)
     besides = mass * (bounce.impulse - 2.0 * away)
     books.impulse[row, one] += besides
     if world.noting is not None:
-        world.near.wall_drag[index(int(touches.wall_rows[c, LISTED])), PRESSED] += besides
+        world.near.wall_drag[index(int(touches.wall_rows[c, col.LISTED])), col.PRESSED] += besides
     if gives_work(wall):
         turned = given(u, v - before)
         give_work(books, row, one, 0.5 * mass * (bounce.work - turned))

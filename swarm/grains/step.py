@@ -14,26 +14,13 @@ from ..kernel.gravity import accelerated
 from ..kernel.jit import Array, outlined, select, wide_long_kernel
 from ..kernel.vector import ZERO, square
 from ..lanes.watching.log import is_full
+from . import grain_arrays as col
 from .at_walls import gather_at_wall, push_walls, sweep_wall
 from .booking import book_pairs, book_wall, count_members
 from .contacts import ContactSweep, find_more_pairs, find_pairs, foresee, travel_of, weight_of, worse
 from .exits import let_out, open_wall
 from .friction import book_rubbing, rub_wall, twist_wall
-from .grain_arrays import (
-    AFTER,
-    BEFORE,
-    DONE,
-    GIVEN,
-    LAST,
-    LIGHTNESS,
-    LOST,
-    SINCE,
-    SKIN,
-    TAKEN,
-    X,
-    set_vector,
-    vector_at,
-)
+from .grain_arrays import set_vector, vector_at
 from .heavy_walls import begin_walls, fly_wall, is_heavy, push_back
 from .held import let_go
 from .lanes_of_pairs import group_pairs, push_pairs, rub_pairs, sweep_pairs, twist_pairs
@@ -54,26 +41,33 @@ _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
 _BESIDE_FRICTION = 1e-10
 # A sweep is not counted on to change less than this part of what the one before did.
 _LEAST_RATIO = 0.1
-# Of impulses of friction; what is left of a slip is seen again by the next step, which begins with them. More digits
-# are dear, for nearly all contacts of a pile stick: a sweep changes 0.985 of what the one before did where 1000 grains
-# lie, and 0.998 where 10 000 do. (Rejected: Anderson's acceleration, 80 sweeps to 4e-7 and 300 to 1e-6 there, and 20 to
-# 1e-8 where 1000 fall, which now take 2.4; Nesterov's, twice as many; friction that is extrapolated: no fewer sweeps;
-# conjugate gradients on the contacts that stick, if these are known: 30 iterations a digit where 1000 lie, 115 where
-# 10 000 do, and 12 and 38 with a sweep there and back as preconditioner. Now 2.2 sweeps are enough there. What 1000
-# grains that lie move in two seconds, and the energy they keep, are the same with half of this tolerance.)
-_RUBBED = 2e-2
-# The same where rolling is resisted: a sweep leaves friction and that resistance more of one another. A ball rolls on a
-# plane as far as its energy lasts to 5e-7, and with 2e-2 to 2.4e-6.
-_ROLLED = 1e-2
-# A contact that a sweep for friction changed by less leaves the others of its balls as they are. As grains fall errors
-# follow from this, and how many sweeps there are from `_RUBBED`: beside 1e-2 and 3e-3, the rms error of velocities in
-# 20 steps is 0.8 to 0.95, in 0.85 of the sweeps; 1.1 in an avalanche and 1.4 at rest, in 0.7 and 0.8 of them.
-_STIRRING = 2e-3
+# Where rolling is resisted friction is solved to this part of its tolerance: a sweep leaves both more of one another. A
+# ball rolls on a plane as far as its energy lasts to 5e-7, and with 1 to 2.4e-6.
+_ROLLED = 0.5
+# A contact that a sweep for friction changed by less than this part of the tolerance leaves the others of its balls as
+# they are. As grains fall errors follow from this, and how many sweeps there are from the tolerance: beside 0.5 and
+# 0.15, the rms error of velocities in 20 steps is 0.8 to 0.95, in 0.85 of the sweeps; 1.1 in an avalanche and 1.4 at
+# rest, in 0.7 and 0.8 of them.
+_STIRRING = 0.1
+# Successive over-relaxation of friction, omega = 2/(1 + 1/sqrt(k + 1)) after k slow sweeps, up to the last number; a
+# slow one changes more than the first number of what the one before did. Nearly all contacts of a pile stick, and with
+# omega = 1 a sweep changes 0.985 of what the one before did where 1000 grains lie: four times the sweeps to 1e-7.
+# (Rejected: omega from 1.3 on in all sweeps, half the error where 1000 fall, and 40 times where contacts are few;
+# always 1.7, twice the sweeps as they fall; Anderson's acceleration, 80 sweeps to 4e-7 and 300 to 1e-6 where they lie,
+# and 20 to 1e-8 where they fall; Nesterov's; friction that is extrapolated from step to step: no fewer sweeps;
+# conjugate gradients on the contacts that stick, if these are known: 12 iterations a digit where 1000 lie, 38 where
+# 10 000 do, each of two sweeps.)
+_SLOW, _MOST_RELAXED = 0.25, 1.7
+# Sweeps for friction go on to round-off where they have improved no more contacts than this in a step: a few grains are
+# exact whatever the tolerance is, and no sweep is added for a pile.
+_CHEAP = 128
 _MOST_SWEEPS = 1000
-# So many sweeps for friction; then it is given as it is, and so are dampers with changes that are no larger than that.
-_MOST_RUBS, _LAGGING = 200, 2e-6
-# Where so many sweeps have not brought the changes down to that part, only half as large a share of them is made.
-_STALLED, _BETTER, _LEAST_SHARE = 20, 0.7, 1.0 / 64.0
+# So many sweeps for friction, and as many for each digit; then it is given as it is, and so are dampers with changes
+# that are no larger than the second number.
+_RUBS_A_DIGIT, _LAGGING = 200, 2e-6
+# Where so many sweeps have not brought the changes down to that part, only half as large a share of them is made. Those
+# for friction may be slow without going round in circles: with 20 of them 1000 grains that lie take 5 times as many.
+_STALLED, _STALLED_RUBS, _BETTER, _LEAST_SHARE = 20, 100, 0.7, 1.0 / 64.0
 
 
 class MarchRule(NamedTuple):
@@ -112,13 +106,13 @@ def _begin(matter, grains, touches, skin):
     place, speed, listed, farthest = grains.place, grains.speed, grains.listed, 0.0
     for k in range(place.shape[0]):
         i = index(k)
-        v = vector_at(speed, i, BEFORE)
-        set_vector(speed, i, AFTER, v + vector_at(grains.change, i, LAST))
-        set_vector(grains.change, i, GIVEN, ZERO)
+        v = vector_at(speed, i, col.BEFORE)
+        set_vector(speed, i, col.AFTER, v + vector_at(grains.change, i, col.LAST))
+        set_vector(grains.change, i, col.GIVEN, ZERO)
         if grains.spin is not None:
-            set_vector(grains.spin, i, AFTER, vector_at(grains.spin, i, BEFORE))
+            set_vector(grains.spin, i, col.AFTER, vector_at(grains.spin, i, col.BEFORE))
         foresee(matter, grains, touches.course, i)
-        farthest = worse(square(vector_at(place, i, X) + v * matter.h - vector_at(listed, i, X)), farthest)
+        farthest = worse(square(vector_at(place, i, col.X) + v * matter.h - vector_at(listed, i, col.X)), farthest)
     return farthest <= 0.25 * skin * skin
 
 
@@ -127,14 +121,14 @@ def _forget_spins(grains):
     """The spins at the end of a step without contacts."""
     if grains.spin is not None:
         for k in range(grains.spin.shape[0]):
-            set_vector(grains.spin, index(k), AFTER, vector_at(grains.spin, index(k), BEFORE))
+            set_vector(grains.spin, index(k), col.AFTER, vector_at(grains.spin, index(k), col.BEFORE))
 
 
 @outlined
 def _forget_given(grains):
     """No impulses of pairs are summed yet."""
     for k in range(grains.change.shape[0]):
-        set_vector(grains.change, index(k), GIVEN, ZERO)
+        set_vector(grains.change, index(k), col.GIVEN, ZERO)
 
 
 @outlined
@@ -143,11 +137,11 @@ def _fly(matter, grains):
     speed = grains.speed
     for k in range(speed.shape[0]):
         i = index(k)
-        v = vector_at(speed, i, BEFORE)
-        if matter.holds is None or grains.place[i, LIGHTNESS] > 0.0:
+        v = vector_at(speed, i, col.BEFORE)
+        if matter.holds is None or grains.place[i, col.LIGHTNESS] > 0.0:
             v = accelerated(matter.pull, v, matter.h)
-        set_vector(speed, i, AFTER, v + vector_at(grains.change, i, GIVEN))
-        set_vector(grains.change, i, GIVEN, ZERO)
+        set_vector(speed, i, col.AFTER, v + vector_at(grains.change, i, col.GIVEN))
+        set_vector(grains.change, i, col.GIVEN, ZERO)
 
 
 def _gather(matter, walls, world, travel):
@@ -241,39 +235,59 @@ def _rub(matter, walls, world, sweep):
     return worst, pressed
 
 
-def _stalled(pace, worst):
+def _stalled(pace, worst, patience):
     """The share of changes to make, the least change so far, and how many sweeps ago that was."""
     share, best, since = pace
     if worst <= _BETTER * best:
         return share, worst, 0
-    if since + 1 < _STALLED:
+    if since + 1 < patience:
         return share, best, since + 1
     return max(0.5 * share, _LEAST_SHARE), best, 0
+
+
+def _contacts(walls, touches):
+    """How many contacts there are."""
+    return touches.used[0] + sum(touches.wall_spans[1, k] for k in range(len(walls.each)))
+
+
+def _is_round_off(worst, before):
+    """Whether a sweep gains no more than what many large impulses leave of one another."""
+    return worst <= _NEARLY and worst >= _GAIN * before
+
+
+def _relaxation(slow):
+    """Omega of the sweep after so many that were slow."""
+    return min(2.0 / (1.0 + 1.0 / math.sqrt(slow + 1.0)), _MOST_RELAXED)
 
 
 @outlined
 def _solve_friction(matter, walls, world):
     """Sweep until friction changes little: whether it does, and what the next sweep would change of normal impulses."""
-    worst, sweeps, share, best, since, follows = 1.0, 0, 1.0, math.inf, 0, math.inf
-    solved = _ROLLED if matter.rolls else _RUBBED
+    before, worst, sweeps, slow, share, best, since, follows = math.inf, 1.0, 0, 0, 1.0, math.inf, 0, math.inf
+    solved = matter.slips * (_ROLLED if matter.rolls else 1.0)
+    cheap = _CHEAP // max(_contacts(walls, world.touches), 1)
+    stirring = _SOLVED if cheap > 1 else _STIRRING * matter.slips
     world.touches.stirred[:] = -1
-    while sweeps < _MOST_RUBS:
+    while sweeps < _RUBS_A_DIGIT * (1.0 - math.log10(solved)):
         number = sweeps if matter.rubs_everywhere else 0
-        worst, pressed = _rub(matter, walls, world, ContactSweep(number, share, _STIRRING))
+        inverse = 1.0 if sweeps < cheap else 1.0 / _relaxation(slow)
+        worst, pressed = _rub(matter, walls, world, ContactSweep(number, share, stirring, inverse))
         sweeps += 1
-        if worst <= solved:
+        if worst <= (_SOLVED if sweeps < cheap else solved) or _is_round_off(worst, before):
             # Where this one has seen all contacts, and dampers act: friction has moved the others by that much at most.
             if sweeps == 1 and matter.damped:
                 follows = _LEAST_RATIO * worse(weight_of(matter.pairs) * worst, pressed)
             break
-        share, best, since = _stalled((share, best, since), worst)
+        slow += select(worst > _SLOW * before, 1, 0)
+        before = worst
+        share, best, since = _stalled((share, best, since), worst, _STALLED_RUBS)
     world.books.sweeps[0] += sweeps
-    return worst <= solved, follows
+    return worst <= max(solved, _NEARLY), follows
 
 
 @outlined
 def _solve(matter, walls, world):
-    """Sweep until the impulses solve the step; whether they do."""
+    """Sweep until the impulses solve the step: whether they do, and 1 where friction or a damper lags, else 0."""
     books, lags, follows = world.books, 0, math.inf
     # Friction first, to fewer digits: then it is given, and what is to be exact depends on the others alone.
     if matter.rubs:
@@ -281,7 +295,7 @@ def _solve(matter, walls, world):
         lags = select(is_rubbed, 0, 1)
     solved = _BESIDE_FRICTION if matter.damped and matter.rubs_everywhere else _SOLVED
     if follows <= solved:
-        return True
+        return True, lags
     before, worst, sweeps, share, best, since = 1.0, 1.0, 0, 1.0, math.inf, 0
     while sweeps < _MOST_SWEEPS:
         worst = _sweep(matter, walls, world, share)
@@ -289,17 +303,16 @@ def _solve(matter, walls, world):
         # What the next one would change, by the ratio of the last two; where only dampers act, as what they take is
         # booked by what they did.
         follows = worst * max(worst / before, _LEAST_RATIO) if matter.damped and sweeps > 1 else worst
-        if follows <= solved or (worst <= _NEARLY and worst >= _GAIN * before):
+        if follows <= solved or _is_round_off(worst, before):
             break
         if worst <= _LAGGING and share <= _LEAST_SHARE:
             break
         before = worst
-        share, best, since = _stalled((share, best, since), worst)
+        share, best, since = _stalled((share, best, since), worst, _STALLED)
     books.sweeps[0] += sweeps
     if worst > _NEARLY and follows > solved:
         lags = 1
-    books.lagging[0] += lags
-    return worst <= _LAGGING
+    return worst <= _LAGGING, lags
 
 
 def _forget(walls, world):
@@ -318,15 +331,15 @@ def _arrive(matter, grains):
     place, speed, half = grains.place, grains.speed, 0.5 * matter.h
     for k in range(place.shape[0]):
         i = index(k)
-        v, r = vector_at(speed, i, AFTER), vector_at(place, i, X)
-        move = (vector_at(speed, i, BEFORE) + v) * half + vector_at(place, i, LOST)
+        v, r = vector_at(speed, i, col.AFTER), vector_at(place, i, col.X)
+        move = (vector_at(speed, i, col.BEFORE) + v) * half + vector_at(place, i, col.LOST)
         end = r + move
-        set_vector(place, i, X, end)
-        set_vector(place, i, LOST, move - (end - r))
-        set_vector(grains.change, i, LAST, v - vector_at(speed, i, BEFORE))
-        set_vector(speed, i, BEFORE, v)
+        set_vector(place, i, col.X, end)
+        set_vector(place, i, col.LOST, move - (end - r))
+        set_vector(grains.change, i, col.LAST, v - vector_at(speed, i, col.BEFORE))
+        set_vector(speed, i, col.BEFORE, v)
         if grains.spin is not None:
-            set_vector(grains.spin, i, BEFORE, vector_at(grains.spin, i, AFTER))
+            set_vector(grains.spin, i, col.BEFORE, vector_at(grains.spin, i, col.AFTER))
 
 
 def _note(matter, walls, world, time):
@@ -459,7 +472,8 @@ def _step(matter, walls, listed, world, skin):
     _push(matter, walls, world)
     _twist_at_walls(matter, walls, world)
     while True:
-        if not _solve(matter, walls, world):
+        is_solved, lags = _solve(matter, walls, world)
+        if not is_solved:
             return Status.UNSOLVED.value
         _push_again(matter, walls, world)
         travel = travel_of(matter, grains)
@@ -476,6 +490,8 @@ def _step(matter, walls, listed, world, skin):
         status = _look(matter, walls, world)
         if status != Status.DONE.value:
             return status
+    # Of what solved the step at last, and once of a step that is taken again with new lists.
+    world.books.lagging[0] += lags
     return Status.DONE.value
 
 
@@ -490,16 +506,16 @@ def march(matter, walls, world, clock, rule):
     needs an empty part: then call this again. INTERRUPTED after so many steps as the rule says; it goes on with the
     same bits.
     """
-    while clock[DONE] < rule.stop:
-        if clock[TAKEN] >= rule.halt[0]:
+    while clock[col.DONE] < rule.stop:
+        if clock[col.TAKEN] >= rule.halt[0]:
             return Status.INTERRUPTED.value
         if world.noting is not None and is_full(world.noting.log):
             return Status.LOG_FULL.value
-        left = (rule.span - clock[DONE]) * matter.h
+        left = (rule.span - clock[col.DONE]) * matter.h
         _let_go(matter, world, rule.moment - left)
         now = walls.during(left, left - matter.h)
-        listed = walls.at(left + clock[SINCE] * matter.h)
-        status = _step(matter, now, listed, world, clock[SKIN])
+        listed = walls.at(left + clock[col.SINCE] * matter.h)
+        status = _step(matter, now, listed, world, clock[col.SKIN])
         if status != Status.DONE.value:
             return status
         time = rule.moment - (left - matter.h)
@@ -513,9 +529,9 @@ def march(matter, walls, world, clock, rule):
         if world.noting is not None:
             _log(matter, now, world, time)
         _arrive_walls(matter, world)
-        clock[DONE] += 1.0
-        clock[TAKEN] += 1.0
-        clock[SINCE] += 1.0
+        clock[col.DONE] += 1.0
+        clock[col.TAKEN] += 1.0
+        clock[col.SINCE] += 1.0
         if world.sender is not None and sent == Status.SENT_WRONG:
             return sent
         if (matter.openings is not None and escaped > 0) or (world.sender is not None and sent != Status.DONE):

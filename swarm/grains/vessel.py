@@ -23,7 +23,8 @@ from ..surfaces.in_motion.posed import Posed
 from ..surfaces.outlines.round_side import RoundSide
 from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
-from .grain_arrays import AFTER, BEFORE, BEGIN, END, FACE, RADIUS, X, vector_at
+from . import grain_arrays as col
+from .grain_arrays import vector_at
 from .heavy_walls import is_heavy
 
 
@@ -83,9 +84,9 @@ def met(wall, listed, spans, k, radius):
         return grown
     members = members_of(grown.members)
     if is_of_faces(members.like):
-        own = NearestMembers(members, listed, spans[k, BEGIN], spans[k, END])
+        own = NearestMembers(members, listed, spans[k, col.BEGIN], spans[k, col.END])
     else:
-        own = member(members, index(listed[index(spans[k, BEGIN])]))
+        own = member(members, index(listed[index(spans[k, col.BEGIN])]))
     return grown.members._replace(body=own) if moves(wall) else own
 
 
@@ -96,8 +97,8 @@ def met_member(wall, listed, spans, k, radius, r):
     grown = wall.grown(radius)
     members = members_of(grown.members)
     if not is_of_faces(members.like):
-        return listed[index(spans[k, BEGIN])]
-    own = NearestMembers(members, listed, spans[k, BEGIN], spans[k, END])
+        return listed[index(spans[k, col.BEGIN])]
+    own = NearestMembers(members, listed, spans[k, col.BEGIN], spans[k, col.END])
     return _nearest(own, grown.members.own_end(r) if moves(wall) else r)
 
 
@@ -143,7 +144,7 @@ def list_in_field(wall, face, grains, near, skin, found):
     place, grid = grains.place, members_of(wall.members).grid
     for a in range(place.shape[0]):
         i = index(a)
-        r, radius, begin = vector_at(place, i, X), place[i, RADIUS], near.used[0]
+        r, radius, begin = vector_at(place, i, col.X), place[i, col.RADIUS], near.used[0]
         r = wall.members.own_place(r) if moves(wall) else r
         reach = radius + 2.0 * skin
         corner = Vec(reach, reach, reach)
@@ -159,7 +160,8 @@ def list_in_field(wall, face, grains, near, skin, found):
                     k += 1
                 if found < near.slot.size:
                     c = index(found)
-                    near.slot[c], near.spans[c, BEGIN], near.spans[c, END], near.spans[c, FACE] = a, first, k, own
+                    near.slot[c], near.spans[c, col.BEGIN] = a, first
+                    near.spans[c, col.END], near.spans[c, col.FACE] = k, own
                 found += 1
     return found
 
@@ -183,8 +185,8 @@ def sweep_of(field, listed, matter, grains, skin):
     )
     for k in range(place.shape[0]):
         i = index(k)
-        r, reach = vector_at(place, i, X), place[i, RADIUS] + 2.0 * skin
-        end = field.own_end(r + half * (vector_at(speed, i, BEFORE) + vector_at(speed, i, AFTER)))
+        r, reach = vector_at(place, i, col.X), place[i, col.RADIUS] + 2.0 * skin
+        end = field.own_end(r + half * (vector_at(speed, i, col.BEFORE) + vector_at(speed, i, col.AFTER)))
         corner = Vec(reach, reach, reach)
         along = block_of(grid, end - corner, end + corner).along
         if (along.x > 0) & (along.y > 0) & (along.z > 0):

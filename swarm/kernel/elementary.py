@@ -48,43 +48,51 @@ _FLAT = 40.0
 
 def sine_and_versine(angle):
     """(sin a, 1 - cos a), the second without cancellation."""
-    return _doubled(*_of_half(angle))
+    return sine_and_versine_of(*reduced(angle))
 
 
-def _doubled(n, sine, cosine):
-    """(sin a, 1 - cos a) from (n, sin y, cos y) for a = n pi + 2 y."""
+def sine_and_versine_of(y, odd):
+    """The same of a `reduced` angle."""
+    return _doubled(odd, *_of_half(y))
+
+
+def _doubled(odd, sine, cosine):
+    """(sin a, 1 - cos a) from (sin y, cos y) of a `reduced` angle."""
     # sin a = +-2 sin y cos y and 1 - cos a = 2 sin^2 y where n is even, 2 cos^2 y where it is odd
-    is_odd = _odd(n) != 0.0
+    is_odd = odd != 0.0
     twice, one = 2.0 * (sine * cosine), select(is_odd, cosine, sine)
     return select(is_odd, -twice, twice), 2.0 * (one * one)
 
 
-def nearly_sine_and_versine(angle):
+def nearly_sine_and_versine_of(y, odd):
     """The same with an error of some 1e-7, for a guess: half the operations."""
-    n = (angle * _INVERSE_PI + _WHOLE) - _WHOLE
-    y = 0.5 * (angle - n * math.pi)
     z = y * y
     sine = y + (y * z) * (-1.0 / 6.0 + z * (1.0 / 120.0 - z * (1.0 / 5040.0)))
     cosine = 1.0 - z * (0.5 - z * (1.0 / 24.0 - z * (1.0 / 720.0 - z * (1.0 / 40320.0))))
-    return _doubled(n, sine, cosine)
+    return _doubled(odd, sine, cosine)
 
 
 def sine_and_cosine(angle):
     """(sin a, cos a), each with an error of 2 ulp of 1; in Python also of arrays."""
-    n, sine, cosine = _of_half(angle)
-    sign = 1.0 - 4.0 * abs(_odd(n))
+    y, odd = reduced(angle)
+    sine, cosine = _of_half(y)
+    sign = 1.0 - 4.0 * abs(odd)
     return sign * (2.0 * (sine * cosine)), sign * ((cosine - sine) * (cosine + sine))
 
 
-def _of_half(angle):
-    """(n, sin y, cos y) for a = n pi + 2 y."""
+def reduced(angle):
+    """y of an angle a = n pi + 2 y, and +-1/2 where n is odd, 0 where it is even."""
     n = (angle * _INVERSE_PI + _WHOLE) - _WHOLE
-    y = 0.5 * (((angle - n * _PI[0]) - n * _PI[1]) - n * _PI[2])
+    return 0.5 * (((angle - n * _PI[0]) - n * _PI[1]) - n * _PI[2]), _odd(n)
+
+
+def _of_half(y):
+    """(sin y, cos y) for |y| up to pi/4."""
     z = y * y
     a, b, c, d, e, f = _SINE
     sine = y + (y * z) * (a + z * (b + z * (c + z * (d + z * (e + z * f)))))
     a, b, c, d, e, f = _COSINE
-    return n, sine, 1.0 - (0.5 * z - z * z * (a + z * (b + z * (c + z * (d + z * (e + z * f))))))
+    return sine, 1.0 - (0.5 * z - z * z * (a + z * (b + z * (c + z * (d + z * (e + z * f))))))
 
 
 def _odd(n):

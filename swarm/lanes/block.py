@@ -217,7 +217,9 @@ def _make_contacts(method, walls, gravity, share, lanes, picked, live):
     are_known = aims(walls, gravity) and walls.inset is None and not method.looks_around
     if at_once and not are_known:
         for i in range(index(live)):
-            aim.put_waves(walls, lanes.course, i, lanes.lane(i).remaining)
+            aim.put_angles(walls, lanes.course, i, lanes.lane(i).remaining)
+        for i in range(index(live)):
+            aim.put_waves(walls, lanes.course, i, False)
     for i in range(index(live)):
         lane, found = lanes.given(method, i), solution(method, lanes, i)
         here = lanes.faced(of_lane(walls, picked, i), i)

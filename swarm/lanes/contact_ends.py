@@ -4,6 +4,14 @@ Over its steps the contact has reversed the normal velocity of the particle, as 
 act as at an impact on a rigid wall at which the particle arrives with that velocity reversed again. So restitution,
 temperatures and all other laws, and the energy that they take, are those of `Impact` for any penalty. Friction is
 Coulomb's, with the whole impulse of the contact, also the part that carries a weight.
+
+In an edge another wall may have given some of the speed away b. After an arrival with the speed a the impulses of this
+wall, I, and of others, O, leave b = I + O - a. So of b this wall has given no more than
+    c = min(b, I),                                                                                        (1)
+and its laws act as at a rigid wall that goes away with x = b - c, at which the particle arrives with c. With
+v = v' - x n the energy |v|^2 changes by
+    -2 x n.dv                                                                                             (2)
+more than |v'|^2. The impulse is I - 2 c + (c + c'), where c' is the speed away that the laws leave: it never pulls.
 """
 
 import math
@@ -14,19 +22,14 @@ from ..contact.reflection import given, relative, rub, wall_velocity
 from ..contact.wall_impact import Arriving, RandomSource, book_energy, impact_on_wall
 from ..kernel.arrays import index, scratch
 from ..kernel.gravity import potential
-from ..kernel.jit import outlined
+from ..kernel.jit import outlined, select
 from ..kernel.vector import dot, norm, square
 from .accounts import add_work
-from .escape import detain
+from .escape import detain, foot_on, leave_contacts, wall_of_row
 from .watching.log import Struck
 
-# Newton steps onto a wall, from the end of a step.
-_SWEEPS = 5
 # Of its speed before a step, what friction leaves by round-off of a particle that it stops.
 _STOPPED = 1e-9
-# An impulse of this part of the speed away has reversed the particle: one that begins at rest has all of it, to
-# round-off, of which a shallow contact has much.
-_REVERSED = 0.999
 
 
 def end_contacts(method, walls, gravity, share, lanes, i, before, pushed):
@@ -36,9 +39,10 @@ def end_contacts(method, walls, gravity, share, lanes, i, before, pushed):
     """
     if method.laws_at_ends is None:
         return
-    _wall, impulse = pushed
+    wall, impulse = pushed
     if impulse > 0.0:
-        _end(method, walls, gravity, share, lanes, i, (before, *pushed))
+        share.state.pressed[index(walls.row(wall)), index(lanes.particle[i])] += impulse
+        _end(method, walls, gravity, share, lanes, i, before, wall)
 
 
 def impulses_before(method, walls, lanes, i):
@@ -55,42 +59,24 @@ def end_hard_contacts(method, walls, gravity, share, lanes, i, before, kept):
     """`end_contacts` with all walls after a hard pass."""
     if method.laws_at_ends is None:
         return
+    pressed, p = share.state.pressed, index(lanes.particle[i])
     for s in range(walls.length()):
-        pushed = _wall_of_row(walls, s, lanes.lane(i).r), lanes.impulse[s, i] - kept[s]
-        end_contacts(method, walls, gravity, share, lanes, i, before, pushed)
-
-
-def _wall_of_row(walls, row, r):
-    """The wall of a row; in a field the member that a point is deepest in, or nearest to."""
-    if len(walls.fields()) == 0:
-        return float(row)
-    return _deepest_of_row(walls, row, r)
+        kept[s] = lanes.impulse[s, i] - kept[s]
+        pressed[s, p] += kept[s]
+    for s in range(walls.length()):
+        # One that absorbs the particle ends its other contacts.
+        if kept[s] > 0.0 and pressed[s, p] > 0.0:
+            _end(method, walls, gravity, share, lanes, i, before, wall_of_row(walls, s, lanes.lane(i).r))
 
 
 @outlined
-def _deepest_of_row(walls, row, r):
-    number, found, most = walls.numbers_near(r), -1.0, -math.inf
-    for k in range(number.size):
-        depth = walls.distance(number[k], r)
-        if walls.row(number[k]) == row and depth > most:
-            found, most = number[k], depth
-    return found
-
-
-@outlined
-def _end(method, walls, gravity, share, lanes, i, step):
-    before, wall, impulse = step
+def _end(method, walls, gravity, share, lanes, i, before, wall):
     flier, p, row = lanes.lane(i), index(lanes.particle[i]), index(walls.row(wall))
-    state = share.state
-    state.pressed[row, p] += impulse
-    now, v = method.at_start(lanes.faced(walls, i), flier.remaining), flier.v
-    # Some walls have exact normals on the wall only.
-    r = flier.r
-    for _sweep in range(_SWEEPS):
-        r = now.project(wall, r)
+    state, v = share.state, flier.v
+    now = method.at_start(lanes.faced(walls, i), flier.remaining)
+    r = foot_on(now, wall, flier.r)
     n, u = now.unit_normal(wall, r), wall_velocity(method.moving, now, wall, r)
     away, pressed = -dot(relative(u, v), n), state.pressed[row, p]
-    b = max(away, 0.0)
     if now.distance(wall, flier.r) > 0.0 and (away <= 0.0 or method.lasts_outside(now, wall, flier.r)):
         if away <= _STOPPED * norm(before) and dot(relative(u, before), n) < 0.0:
             # In a contact that a weight makes last, friction acts each time that the particle turns back, and where
@@ -101,9 +87,7 @@ def _end(method, walls, gravity, share, lanes, i, step):
         return
     whole = state.rubbed[row, p] + pressed
     state.pressed[row, p] = state.rubbed[row, p] = 0.0
-    # An impulse that has not reversed the particle is the rest of a contact that has ended.
-    if whole >= _REVERSED * b:
-        _act(method, walls, now, gravity, share, lanes, i, (wall, r, n, u, b, pressed, whole))
+    _act(method, walls, now, gravity, share, lanes, i, (wall, r, n, u, max(away, 0.0), pressed, whole))
 
 
 def _drag(method, walls, share, lanes, i, at):
@@ -130,30 +114,34 @@ def _act(method, walls, now, gravity, share, lanes, i, at):
     """
     wall, r, n, _u, b, _pressed, impulse = at
     flier, p, laws = lanes.lane(i), index(lanes.particle[i]), method.laws_at_ends
-    mass = share.state.mass[p]
-    # As it would arrive at a rigid wall
-    before = flier.v + 2.0 * b * n
+    time, mass = share.moment - method.seconds(flier.remaining), share.state.mass[p]
+    # As it would arrive at a rigid wall, (1)
+    c = min(b, impulse)
+    before = flier.v + 2.0 * c * n
     if laws.loses or laws.send_off:
-        impulse += _send(method, walls, now, gravity, share, lanes, i, at) - 2.0 * b
+        impulse += _send(method, walls, now, gravity, share, lanes, i, at) - 2.0 * c
     if share.log is not None:
-        time = share.moment - method.seconds(flier.remaining)
         struck = Struck(lanes.particle[i], wall, time, r, before, flier.v, impulse * mass)
         share.log.hit(share.state.image, share.log.with_slip(laws, now, struck))
 
 
 def _send(method, walls, now, gravity, share, lanes, i, at):
     """Let the laws act: the impulse per mass of a rigid wall."""
-    wall, r, n, u, b, pressed, _impulse = at
+    wall, r, n, u, b, pressed, impulse = at
     state, flier, p, laws = share.state, lanes.lane(i), index(lanes.particle[i]), method.laws_at_ends
-    v, mass = flier.v, state.mass[p]
-    before = v + 2.0 * b * n
-    turned = given(u, v - before)
+    c, v, mass = min(b, impulse), flier.v, state.mass[p]
+    x = b - c
+    # v' of (2) and its arrival
+    apart = v + x * n
+    before = apart + 2.0 * c * n
+    turned = given(u, apart - before)
     # Of the impacts before this one, which has been counted.
     number = state.impacts[p] + np.int64(flier.hits) - 1
     random = RandomSource(share.seed, share.first).of_impact(p, number, laws)
     arriving = Arriving(r, before, square(before) + 2.0 * potential(gravity, r), mass)
     bounce = impact_on_wall(laws._replace(friction=None), now, gravity, wall, arriving, random)
-    bounce = _rubbed(laws, wall, n, u, bounce, bounce.impulse + max(pressed - 2.0 * b, 0.0))
+    bounce = _rubbed(laws, wall, n, u, bounce, max(pressed + (bounce.impulse - 2.0 * c), 0.0))
+    bounce = _put_back(laws, bounce, x, n, apart)
     # Of the velocities themselves: what a step is to keep is known to round-off.
     change = square(bounce.v) - square(v)
     flier.v = bounce.v
@@ -161,14 +149,22 @@ def _send(method, walls, now, gravity, share, lanes, i, at):
     if not method.dissipates:
         state.energy[p] += 0.5 * change
     row = index(now.row(wall))
-    lanes.impulse[row, i] += bounce.impulse - 2.0 * b
+    lanes.impulse[row, i] += bounce.impulse - 2.0 * c
     add_work(walls, lanes.impulse, i, wall, 0.5 * (bounce.work - turned))
     heat = book_energy(state, (row, p, p), mass, bounce)
     if share.counts is not None:
         share.counts.give(wall, heat, bounce.wait)
     if state.absorbed is not None and bounce.wait > 0.0:
-        _keep(method, share, lanes, i, wall, bounce.wait)
+        _keep(method, walls, share, lanes, i, wall, bounce.wait)
     return bounce.impulse
+
+
+def _put_back(laws, bounce, x, n, apart):
+    """A `Bounce` with the speed away x that others have given; (2) is lost, or heat of the law that has acted."""
+    more = -2.0 * x * dot(n, bounce.v - apart)
+    is_heat = bounce.is_sent & (bounce.heat != 0.0 if laws.may_dissipate else laws.give_heat)
+    lost, heat = bounce.lost - select(is_heat, 0.0, more), bounce.heat + select(is_heat, more, 0.0)
+    return bounce._replace(v=bounce.v - x * n, lost=lost, heat=heat)
 
 
 def _rubbed(laws, wall, n, u, bounce, impulse):
@@ -184,13 +180,17 @@ def _rubbed(laws, wall, n, u, bounce, impulse):
     )  # fmt: skip
 
 
-def _keep(method, share, lanes, i, wall, wait):
+def _keep(method, walls, share, lanes, i, wall, wait):
     """A lane waits on a wall for whole steps, or is absorbed by it."""
     flier, p = lanes.lane(i), index(lanes.particle[i])
     if method.steps_into_walls and wait < math.inf:
         wait = math.ceil(wait / method.dt) * method.dt
+    # Another wall may let it wait beyond the frame already.
+    wait += max(share.state.starts[p] - share.moment, 0.0)
     if detain(share, p, wall, method.seconds(flier.remaining), wait):
         flier.remaining = flier.remaining - (wait / method.dt if method.steps_into_walls else wait)
     else:
+        if wait == math.inf:
+            leave_contacts(method, walls, share, lanes, i)
         flier.remaining = 0.0
     lanes.marked[i] = not (flier.remaining > 0.0)

@@ -18,6 +18,9 @@ from .table import marked_lanes
 from .watching.crossings import ParticleMoment
 from .watching.log import Struck
 
+# Newton steps onto a wall, from the end of a step.
+_SWEEPS = 5
+
 
 def escape(share, p, wall, r, v, remaining):
     """Book that particle p escapes with so much of its frame left; it keeps its place and velocity."""
@@ -100,6 +103,8 @@ def _face(openings, method, walls, gravity, share, lanes, i):
     for k, wall in enumerate(now.each):
         if lets_out(openings, method, now, float(k), wall.project(lane.r), near):
             lanes.stand[k, i], some_open = 0.0, True
+            if method.laws_at_ends is not None:
+                cut_contact(method, now, share, lanes, i, k)
             # The energy that the contact has stored is lost.
             lost += method.law.stored_energy(wall.gap_of(wall.inner(lane.r)))
     if some_open:
@@ -140,8 +145,7 @@ def step_out(method, walls, share, lanes, i):
     if out < 0.0:
         return False
     p, counters = index(lanes.particle[i]), share.counters
-    rest = method.at_start(lanes.faced(walls, i), flier.remaining)
-    _lose(method, share, lanes, i, contact_energy(method.law, rest, 1.0, flier.r))
+    leave_contacts(method, walls, share, lanes, i)
     if counters is not None:
         counters.retire(share.state, lanes, p, i)
     escape(share, p, out, flier.r, flier.v, method.seconds(flier.remaining))
@@ -149,6 +153,63 @@ def step_out(method, walls, share, lanes, i):
         counters.load(share.state, lanes, p, i)
     flier.remaining, lanes.wall[i], lanes.marked[i] = 0.0, -1.0, True
     return True
+
+
+# --- Contacts that do not end by themselves --------------------------------------------------------------
+
+
+@outlined
+def leave_contacts(method, walls, share, lanes, i):
+    """End the contacts of a lane that leaves: what they store is lost, and each has a row in the log."""
+    now, r = method.at_start(lanes.faced(walls, i), lanes.lane(i).remaining), lanes.lane(i).r
+    _lose(method, share, lanes, i, contact_energy(method.law, now, 1.0, r))
+    if method.laws_at_ends is not None:
+        for k in range(walls.length()):
+            cut_contact(method, now, share, lanes, i, k)
+
+
+@outlined
+def cut_contact(method, now, share, lanes, i, row):
+    """End a contact without its laws, at a wall that is open there or where the lane leaves."""
+    state, lane, p = share.state, lanes.lane(i), lanes.particle[i]
+    if share.log is not None:
+        time = share.moment - method.seconds(lane.remaining)
+        log_cut_contact(share.log, method.laws_at_ends, now, state, row, (p, lane.r, lane.v, time))
+    state.pressed[row, index(p)] = state.rubbed[row, index(p)] = 0.0
+
+
+def log_cut_contact(log, laws, now, state, row, at):
+    """A row for a contact that laws do not end, with its impulse so far; `at` is (particle, place, velocity, time)."""
+    p, r, v, time = at
+    i = index(p)
+    impulse = (state.pressed[row, i] + state.rubbed[row, i]) * state.mass[i]
+    if impulse > 0.0:
+        wall = wall_of_row(now, row, r)
+        log.hit(state.image, log.with_slip(laws, now, Struck(p, wall, time, foot_on(now, wall, r), v, v, impulse)))
+
+
+def foot_on(now, wall, r):
+    """The place on a wall that a point near it is in contact with: some walls have exact normals on the wall only."""
+    for _sweep in range(_SWEEPS):
+        r = now.project(wall, r)
+    return r
+
+
+def wall_of_row(walls, row, r):
+    """The wall of a row; in a field the member that a point is deepest in, or nearest to."""
+    if len(walls.fields()) == 0:
+        return float(row)
+    return _deepest_of_row(walls, row, r)
+
+
+@outlined
+def _deepest_of_row(walls, row, r):
+    number, found, most = walls.numbers_near(r), -1.0, -math.inf
+    for k in range(number.size):
+        depth = walls.distance(number[k], r)
+        if walls.row(number[k]) == row and depth > most:
+            found, most = number[k], depth
+    return found
 
 
 # --- Particles that slide --------------------------------------------------------------------------------

@@ -222,7 +222,7 @@ class Reflection(contract.MethodNumbers):
             wall,
             impulse,
             select(self.is_within(lane, speed2, impulse, _NO_IMPACT), 0.0, 1.0),
-            select(hit, bounce.twice_energy, lane.own.energy.twice),
+            select(hit, bounce.twice_energy, kept(lane.own.energy.twice)),
             hit & self.is_within(lane, speed2, away, 1.0),
             select(hit, 0.5 * bounce.work, 0.0),
         )
@@ -332,7 +332,7 @@ class Centred(Chord):
     def contact(self, walls, gravity, lane, wall, solution):
         half = self.half(lane)
         speed2, half_inverse = speed2_at(gravity, lane.r, lane.own.energy)
-        w = restore(gravity, solution.turned.v, speed2, half_inverse)
+        w = restore(solution.turned.v, speed2, half_inverse, gravity is not None)
         free = flights.is_free(walls, lane.r, accelerated(gravity, w, 0.5 * half), half)
         end = lane.r + displacement(gravity, w, half), accelerated(gravity, w, half), half
         return self.ended(lane, wall, solution, end, free)

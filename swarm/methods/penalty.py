@@ -1,10 +1,12 @@
 """Penalty: fixed steps with soft walls, conserving kinetic + potential + stored energy."""
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from ..common import checks
 from ..contact import corner
 from ..contact import energy as energies
 from ..contact import impulse as contact_impulse
@@ -15,7 +17,7 @@ from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import select
 from ..kernel.vector import Vec, norm
 from ..scene import Scene
-from . import fixed_step
+from . import base, fixed_step
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,9 @@ class Penalty(fixed_step.SoftWalls):
         penalty: alpha > 0, the stiffness of the wall (N/m for a = 1 and a gap in m).
         exponent: a >= 1 of the regularisation: 1 a linear spring, 1.5 Hertz's law.
         gradient: "composite", or "mean-value", which is the paper's general form, slow, and needs exponent > 1.
+        friction_tolerance: of grains, from 1e-10 to 1: the change by which a sweep over all contacts ends the
+            solution of a step for friction, relative to what moves at a contact. In 20 steps places in a pile are
+            exact to 5e-5 of a radius with 0.02, and to 1e-10 with 1e-8. A few grains are exact with any.
 
     Raises:
         SceneError: an argument is out of its range; a frame time is not a whole number of steps.
@@ -47,11 +52,13 @@ class Penalty(fixed_step.SoftWalls):
     a step may go a twentieth of the shortest period.
 
     Laws of walls: `restitution`, `friction`, `temperature` and `laws` act on points where a contact ends. They make of
-    it what they make of an impact on a rigid wall, and what they take or give is booked. Friction acts on the whole
-    impulse of a contact; in a contact that gravity makes last it acts each time that the particle swings back.
+    it what they make of an impact on a rigid wall, and what they take or give is booked. In an edge they act on no more
+    speed than their wall has given, and what other walls have given besides stays. Friction acts on the whole impulse
+    of a contact; in a contact that gravity makes last it acts each time that the particle swings back.
 
     Openings: a step decides at its start whether the wall is open at the foot of the point on it. Doors are at whole
-    steps. What a contact stores with a wall that opens, or goes, is in "dissipated_energy".
+    steps. What a contact stores with a wall that opens, or goes, is in "dissipated_energy"; so is what walls store of a
+    particle that another wall absorbs.
 
     Unions and foams: a `Union` of several rooms, or a foam, is one wall with the same laws for all of its parts. In a
     doorway nothing pushes, and behind the edge of one the nearer room does. A step that is longer than the wall
@@ -93,6 +100,7 @@ class Penalty(fixed_step.SoftWalls):
     """
 
     gradient: fixed_step.Gradient = "composite"
+    friction_tolerance: Annotated[float, partial(checks.part, least=1e-10)] = field(default=0.02, metadata=base.YOUNGER)
 
     def __post_init__(self) -> None:
         super().__post_init__()

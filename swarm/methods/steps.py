@@ -15,7 +15,7 @@ from ..contact.discrete_gradient import MeanValue
 from ..contact.impulse import Step
 from ..contact.laws import NONE
 from ..contact.reflection import Energy, chord, exact
-from ..contact.touching import ImpactSettings, MovingParticle, impact
+from ..contact.touching import ImpactSettings, ParticleMoment, impact
 from ..kernel.arrays import kept, scratch
 from ..kernel.gravity import accelerated, displacement
 from ..kernel.jit import outlined, select
@@ -284,7 +284,7 @@ class CutSteps(StepNumbers):
         shortest = self.shortest_length / math.sqrt(energy.twice)
         contacts = ImpactSettings(None, NONE, shortest, _SAME_INSTANT * self.shortest_length)
         end = impact(
-            contacts, walls, None, wall, MovingParticle(lane.r, lane.v, lane.remaining), energy, lanes.impulse, i
+            contacts, walls, None, wall, ParticleMoment(lane.r, lane.v, lane.remaining), energy, lanes.impulse, i
         )
         return _after(end.r, end.v, lane.remaining - end.used, 1.0), Status.DONE.value
 

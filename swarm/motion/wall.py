@@ -20,19 +20,7 @@ from ..common.checks import Vector
 from ..common.validated import Bounded, Magnitude
 from ..errors import SceneError
 from ..state import Floats
-from .given import (
-    Axis,
-    Given,
-    Led,
-    Oscillation,
-    Rotation,
-    Sum,
-    Translation,
-    parts_of,
-    point_of,
-    unit_axis,
-    vector_of,
-)
+from .given import Axis, Given, Led, Oscillation, Rotation, Sum, Translation, parts_of, point_of, unit_axis, vector_of
 
 # A path of more times is shown without them.
 _FEW = 4

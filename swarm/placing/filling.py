@@ -29,8 +29,8 @@ _TRIALS_A_POINT, _FEWEST_TRIALS = 8, 64
 _LEAST, _TRIES, _CLEARLY = 1e-6, 20_000_000, 2.0
 # Of balls the volume is estimated from as many admissible points, to 0.1 %.
 _POINTS = 1 << 18
-# How many of these tell whether balls are few, so many standard deviations from where it would be another answer; and
-# how many are looked at together.
+# So many of these points tell whether balls are few, if the answer is so many standard deviations from the other one;
+# so many points are looked at together.
 _SOME, _CERTAIN, _AT_ONCE = 1 << 15, 7.0, 1 << 14
 _INSTEAD = "the particles as arrays, a CSV file or a source with a volume"
 
@@ -170,7 +170,7 @@ def room_of(scene: Scene, random: np.random.Generator, user: str) -> VolumeBox:
 def _roomy(scene: Scene, radius: Floats, random: np.random.Generator) -> VolumeBox | None:
     """What `room_of` returns, with the volume for later, where some of its points show that balls fill little of it.
 
-    Returns None, with nothing drawn, if they do not, or do not show how many points it looks at.
+    Returns None, with nothing drawn, where balls fill more, or where these do not tell how many points it would draw.
     """
     low, high = bounding_box(scene, "fill", _INSTEAD)
     if _is_its_box(scene, low, high):
@@ -222,9 +222,9 @@ def _is_its_box(scene: Scene, low: Floats, high: Floats) -> bool:
 
 
 def _admitted(scene: Scene, low: Floats, high: Floats, random: np.random.Generator, count: int) -> int:
-    """How many of the first points of a batch are admissible, of which the generator draws none.
+    """How many of the first points of the next batch are admissible; the generator draws none of them.
 
-    They are some at a time, which fit into the cache.
+    Points are made some at a time, as many as the cache holds.
     """
     draws, found = [], 0
     for k in range(len(scene.axes())):

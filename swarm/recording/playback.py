@@ -14,7 +14,7 @@ from rerun.chunk import RrdReader
 
 from ..errors import FileError, SceneError
 from ..files import paths
-from ..files.sources import DAMAGE, DamagedError, reason, require_file
+from ..files.sources import DAMAGE, DamagedError, commands_for, reason, require_file
 from ..state import Floats
 from ..triangles.shape import Shape
 
@@ -63,7 +63,7 @@ class Playback:
             with open(path, "rb") as file:
                 foreign = not file.read(len(_BEGIN)).startswith(_BEGIN)
             if foreign:
-                raise SceneError(f"{path} is not a recording of swarm") from error
+                raise SceneError(f"{path} is not a recording of swarm{commands_for(path, '.rrd')}") from error
             problem = reason(error).replace(f"Failed to read RRD file at {path}: ", "")
             raise DamagedError(f"{path} is damaged: {problem}; swarm info --repair may repair it") from error
 

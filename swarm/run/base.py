@@ -35,7 +35,7 @@ _FAR = 100.0
 OUTSIDE = 1e-9
 # The caller's thread looks for an interrupt so often [s].
 _GLANCE = 0.1
-# A kernel is done with fewer particles than this before another thread is awake.
+# With fewer particles than this a kernel ends before another thread is awake.
 _FEW = 4096
 # The particles between two looks at the halt, compiled and in plain Python: some 0.1 s of work.
 _AT_ONCE, _AT_ONCE_PLAIN = 1 << 16, 8
@@ -44,7 +44,7 @@ T = TypeVar("T")
 
 
 class BaseRun:
-    """A run from frame to frame: it times, halts, balances and observes an engine, as a context in which threads live.
+    """A run from frame to frame: it times, halts, balances and observes an engine. Its threads end with its context.
 
     The functions in which engines differ come first.
 
@@ -93,7 +93,7 @@ class BaseRun:
         self._threads, self._tier, self._watch = threads, tier, Watch(n)
         self._impacts, self._tally, _counters = watched
         self._size, self._partial = CHUNK, np.zeros((math.ceil(n / CHUNK), observables.ROWS))
-        # The energy of the start, and the time of the last frame, of the method's clock.
+        # The energy at the start [J], and the method's time at the last frame [s].
         self._start, self._moment = np.zeros(1), 0.0
         # When the frame began [s], how many of its pieces are done, and when it ends [s].
         self._begun, self._done, self._end = np.zeros(1), np.zeros(1, np.int64), 0.0
@@ -422,8 +422,8 @@ def arrays_of(found: Mapping[str, Any]) -> Arrays:
 def result_of(share: "Future[T]", latest: float, halt: Callable[[], None]) -> T:
     """The result of a thread, which is halted at `latest` [s of time.monotonic].
 
-    In many short waits: Python takes up a signal between two of them, and one that comes just before a long wait (or to
-    another thread) would be seen at its end only.
+    It waits many short times: Python handles a signal between two of them. One that came just before a long wait, or to
+    another thread, would be handled only at the end of that.
     """
     while True:
         try:

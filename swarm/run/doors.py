@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from .. import observables
 from ..contact.events import ARRIVED, CAREFUL, EDGE, FLYING, HELD
 from ..errors import RunError
+from ..kernel.vector import column
+from ..lanes.escape import log_cut_contact
 from ..scene import Scene
 from ..state import Contacts, State
 from ..surfaces.surface import Surface
@@ -25,8 +27,9 @@ class DoorRun(Run):
 
     # What contacts stored before the instant that has come, per mass [J/kg].
     _stored_before: NDArray[np.float64] | None = None
-    # Which rows have a wall that goes, or opens, then.
+    # Which rows have a wall that goes, or opens, then, and the walls before.
     _left: NDArray[np.bool_]
+    _walls_before: Any
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
@@ -60,10 +63,24 @@ class DoorRun(Run):
     def _lose(self, lost: NDArray[np.float64]) -> None:
         """Take energies from the particles, per mass [J/kg], which were stored with walls that went."""
         self.state.energy[:] -= lost
-        for impulse in (self.state.pressed, self.state.rubbed):
-            if impulse is not None:
-                impulse[np.ix_(self._left, lost > 0.0)] = 0.0
+        self._cut_contacts(lost > 0.0)
         self.state.dissipated[:] += lost * self.state.mass
+
+    def _cut_contacts(self, loses: NDArray[np.bool_]) -> None:
+        """End the contacts of these particles with walls that went, or opened: each has a row, and no law acts."""
+        state, pressed, rubbed = self.state, self.state.pressed, self.state.rubbed
+        if pressed is None or rubbed is None:
+            return
+        page, walls = self._open_page(self._moment), self._walls_before.at(0.0)
+        cut = self._left[:, None] & loses & (pressed + rubbed > 0.0)
+        if page is not None:
+            for row, i in np.argwhere(cut):
+                if page.log.filled[0] == page.log.time.size:
+                    page.turn()
+                at = i, column(state.position, 0, i), column(state.velocity, 0, i), page.log.begin
+                log_cut_contact(page.log, self._numbers.laws_at_ends, walls, state, row, at)
+            page.close()
+        pressed[cut] = rubbed[cut] = 0.0
 
     # --- At an instant -----------------------------------------------------------------------------------
 
@@ -80,7 +97,7 @@ class DoorRun(Run):
         last, pieces = _before(self._scene, instant), self._compiled.pieces
         gone = np.array([one.is_there(last) and not one.is_there(instant) for one in pieces.each])
         if self._law is not None:
-            self._stored_before = self._stored(0.0)
+            self._stored_before, self._walls_before = self._stored(0.0), self._walls
             volumes = map(itertools.chain, pieces.volumes, pieces.doorways)
             opens = [_some_come(some, last, instant) for some in volumes]
             self._left = (gone | opens)[self._compiled.numbering.pieces_of_rows]

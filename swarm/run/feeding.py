@@ -167,9 +167,10 @@ class Feed:
         return bool((depths[self._changing] <= 0.0).all())
 
     def _pause(self, k: int, number: int, there: There) -> float:
-        """The time in which a ball may make room [s]: that of its radius, by the fastest of three paces.
+        """How long to wait before a place is tried again [s]: the time in which a ball moves by a radius.
 
-        These are the speed of the source, that of a fall by the radius, and that of the balls that are there.
+        Its speed is the largest of three: that of the source, that after a fall by the radius, and the root mean square
+        of the speeds of the balls that are there.
         """
         source, n = self._births.balls[k], there.radius.size
         radius = source.largest()
@@ -181,7 +182,7 @@ class Feed:
         return radius / pace if pace > 0.0 else math.inf
 
     def _next_due(self, now: float) -> float:
-        """When the next birth of any source is due [s]: where nothing moves, another place may be found then."""
+        """When the next birth of any source is due [s]: where nothing moves, a place is tried again then."""
         times = self._births.time[self._births.source >= 0]
         return float(times[times > now].min(initial=math.inf))
 

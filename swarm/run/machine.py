@@ -17,7 +17,7 @@ from ..common.frames import Frame
 from ..common.snapshot import NOTHING, Read, Snapshot
 from ..kernel.cache import kernels_compiled
 from ..kernel.compiling import Compilations
-from ..particles import Particles
+from ..particles import ARRAYS, Particles
 from ..scene import Scene
 from ..state import Absorbed, Multipliers
 from . import failures
@@ -36,13 +36,12 @@ if TYPE_CHECKING:
     from ..files.background import Background
 
 _LOG = logging.getLogger("swarm")
-_OF_PARTICLES = "position", "velocity", "mass", "image", "radius", "spin"
 # Observables of so many frames are packed into arrays: as Python objects they take 3 kB a frame.
 _PACKED = 1024
 
 
 class RunEnd(NamedTuple):
-    """The end of a run; `Result` describes each of these."""
+    """What a run ends with; `Result` describes each field."""
 
     particles: Particles
     observables: dict[str, NDArray[Any]]
@@ -127,9 +126,9 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
 
 @contextlib.contextmanager
 def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display, Watched, Measures]]:
-    """A run at its start or its checkpoint, its `Background` writer or None, its display, its records and its measures.
+    """A context with a run at its start or checkpoint, its `Background` writer or None, display, records and measures.
 
-    Until the context ends signals stop the run, and its files are locked.
+    Until it ends, signals stop the run and its files are locked.
     """
     recorder, watched = recorder_of(task), Watched(log_of(task), tally_of(task), task.options.counters)
     runs: list[BaseRun] = []
@@ -158,7 +157,7 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
 
 
 def _why_slow(scene: Scene) -> str:
-    """Why kernels of this scene may take long to compile, or "": one wall has no fewer to be made of."""
+    """Why kernels of this scene may take long to compile, in a sentence; "" for fewer than two such walls."""
     rough = sum(one.motion is not None and bool(one.friction) for one in scene.surfaces)
     if rough < 2:
         return ""
@@ -180,7 +179,7 @@ def _measures_of(task: Task, session: Session) -> Measures:
 
 def start_of(task: Task) -> Snapshot:
     """The particles of a run at its start."""
-    arrays: dict[str, Any] = {name: getattr(task.particles, name) for name in _OF_PARTICLES}
+    arrays: dict[str, Any] = {name: getattr(task.particles, name) for name in ARRAYS}
     arrays["impacts"] = np.zeros(len(task.particles), np.int64)
     arrays["collisions"] = None if task.particles.radius is None else np.zeros(len(task.particles), np.int64)
     return _snapshot_of(task, arrays.get, 0.0)
@@ -226,7 +225,7 @@ def warn_open() -> None:
 
 
 def _meanwhile(session: Session, writer: "Background | None", show: Display) -> tuple[float, float]:
-    """The last arguments of `BaseRun.advance`: the time to write a frame [s], and when it returns at the latest."""
+    """The last two arguments of `BaseRun.advance`: the time to write a frame [s], and the latest time to return."""
     return writer.seconds if writer else 0.0, min(session.latest(writer), time.monotonic() + min(show.every, LOOK))
 
 

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
 
 class Session:
-    """From a start or a checkpoint to the end, a signal or the wall time limit; it locks the trajectory.
+    """A session of a run, from the start or a checkpoint to the end, a signal or the wall time limit.
 
-    Without a trajectory it saves nothing.
+    It locks the trajectory. Without a trajectory it saves nothing.
 
     Args:
         options: the options of the run.
@@ -70,7 +70,7 @@ class Session:
             raise FileError(f"{error}{self._way_on()}") from error
 
     def _way_on(self) -> str:
-        """How a run goes on that could not write its files, as the end of a sentence."""
+        """How to go on after a run could not write its files, as the end of a sentence."""
         if self._has_checkpoint:
             return f"; with resume the run goes on from {self._path}"
         if not self._saves:

@@ -194,7 +194,10 @@ class PointBatches:
         return points, normals
 
     def _sentence(self, count: int, tried: int) -> str:
-        return f"{self._beginning()}, of which {count} of {tried} points are; move it, or make it larger"
+        advice = "move it, or make it larger"
+        if any(holes for _wall, holes in self._place.walls):
+            advice = "births on a wall are outside its openings: for births in an opening give that one as where="
+        return f"{self._beginning()}, of which {count} of {tried} points are; {advice}"
 
     def _beginning(self) -> str:
         within = " and in within=" * bool(self._place.only)

@@ -14,13 +14,6 @@ from .shapes.plane import PlaneNumbers
 from .time_of_impact import flights
 
 
-class Crossing(Record):
-    """When a flight crosses a counter, and the number of its wall, or -1 where it surely crosses none until then."""
-
-    time: Any
-    wall: Any
-
-
 class Counted(Record):
     """A counter. Its `sign` is 1 of a particle on its admissible side, -1 of one on the other."""
 
@@ -33,7 +26,7 @@ class Counted(Record):
         raise NotImplementedError
 
     def crossing(self, sign, gravity, r, v):
-        """The first `Crossing` of a flight."""
+        """The first `Hit` of a flight with a wall of the counter."""
         raise NotImplementedError
 
     def may_cross_again(self, sign, gravity, r, v, span):
@@ -79,7 +72,7 @@ class ReversedCounter(Counted):
 
     def crossing(self, sign, gravity, r, v):
         time, found = flights.hit(gravity, with_sign(self.wall, sign), r, v)
-        return Crossing(time, select(found, 0.0, -1.0))
+        return flights.Hit(time, select(found, 0.0, -1.0))
 
     def distance(self, r):
         return self.wall.distance(r)
@@ -119,10 +112,8 @@ class Walled(Counted):
 
     def crossing(self, sign, gravity, r, v):
         if sign > 0.0:
-            found = flights.first_hit(self.inner, gravity, r, v)
-        else:
-            found = flights.first_hit(self.outer, gravity, r, v)
-        return Crossing(found.time, found.wall)
+            return flights.first_hit(self.inner, gravity, r, v)
+        return flights.first_hit(self.outer, gravity, r, v)
 
     def distance(self, r):
         return penetration(self.inner, r) - penetration(self.outer, r)

@@ -8,12 +8,6 @@ from ..errors import SceneError
 from .shapes.plane import Plane
 from .surface import Surface
 
-# What is given to the whole holds for those of its parts that leave it at its default.
-_HANDED_DOWN = (
-    "restitution", "friction", "rolling", "temperature", "accommodation", "laws", "motion", "present", "mass",
-    "inertia",
-)  # fmt: skip
-
 
 def checked_parts(value: Any, name: str) -> tuple[Surface, ...]:
     """The argument `parts`, checked."""
@@ -30,11 +24,7 @@ def checked_parts(value: Any, name: str) -> tuple[Surface, ...]:
 def handed_down(whole: Surface, part: Surface) -> Surface:
     """A part with what is given to the whole, where it leaves that at its default."""
     defaults = {one.name: one.default for one in fields(Surface)}
-    given = {
-        name: getattr(whole, name)
-        for name in _HANDED_DOWN
-        if getattr(part, name) == defaults[name] != getattr(whole, name)
-    }
+    given = {name: value for name, value in whole.common().items() if getattr(part, name) == defaults[name] != value}
     if part.temperature is not None:
         given.pop("accommodation", None)
     if whole.openings:

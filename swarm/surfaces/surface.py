@@ -28,6 +28,8 @@ SIDES = {"inside": 1.0, "outside": -1.0}
 Box = tuple[Vector, Vector]
 HalfSpace = tuple[Vector, float]
 UNBOUNDED: Box = ((-math.inf,) * 3, (math.inf,) * 3)
+# The arguments of a surface on which an impact, or a contact, depends besides its shape and its motion.
+LAWS = "restitution", "friction", "rolling", "temperature", "accommodation", "laws"
 # The number of a part, and of a part of this.
 Place = tuple[int, ...]
 # phi and its gradient (N, 3), functions of points (N, 3).
@@ -321,6 +323,10 @@ class Surface(Validated):
         """
         raise NotImplementedError
 
+    def common(self) -> dict[str, Any]:
+        """The arguments of every surface but its rotation: its laws, and how it moves, where it is open and when."""
+        return {one.name: getattr(self, one.name) for one in fields(Surface) if one.name != "rotation"}
+
     def rooms_of_balls(self) -> "tuple[Any, ...]":
         """The rooms that balls meet: for each the surfaces around it."""
         return self.rooms
@@ -454,12 +460,16 @@ class Surface(Validated):
 
     def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         """Gradient of phi at points (3, N); shape (3, N). On an edge it is that of one of the parts."""
+        found = self._own_gradient(points, time)
+        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
+
+    def _own_gradient(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
+        """That gradient in the frame in which the surface is given."""
         rows = self._own_rows(points, time)
         with np.errstate(all="ignore"):
             parts = [np.array(np.broadcast_arrays(*wall.gradient(rows), rows.x)[:3]) for wall in self.walls()]
             largest = np.argmax([wall.phi(rows) for wall in self.walls()], axis=0)
-        found = np.asarray(np.choose(largest, parts))
-        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
+        return np.asarray(np.choose(largest, parts))
 
     def reaching_outside(
         self, points: NDArray[np.float64], radius: NDArray[np.float64], time: float = 0.0

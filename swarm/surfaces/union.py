@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import motion as motions
 from ..common.checks import Vector
 from ..errors import SceneError
 from ..state import Floats
@@ -236,15 +235,14 @@ class Joined(Surface):
         rows = self._own_points(points, time)
         return np.asarray(self._of_gaps.reduce(self._gaps(rows, time)))
 
-    def gradient(self, points: ArrayLike, time: float = 0.0) -> Floats:
-        """Gradient of that phi, of the part with that gap, at points (3, N); shape (3, N)."""
+    def _own_gradient(self, points: ArrayLike, time: float) -> Floats:
         rows = self._own_points(points, time)
         gaps = self._gaps(rows, time)
         least = (np.argmin if self._of_gaps is np.minimum else np.argmax)(gaps, axis=0)
         found = np.zeros(rows.shape)
         for k, part in enumerate(self.parts):
             found = np.where(least == k, side_of(part) * part.gradient(rows, time), found)
-        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
+        return found
 
     def _gaps(self, rows: Floats, time: float) -> Floats:
         """The gaps of the parts: nowhere where one has no value, and all over where its walls are not there."""

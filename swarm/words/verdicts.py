@@ -177,10 +177,11 @@ def _momentum(content: Any) -> list[Statement]:
 
 
 def _multipliers(content: Any) -> list[Statement]:
-    """Whether loops of multipliers ended by themselves."""
-    if not content.method.has_multipliers():
-        return []
+    """Whether loops of multipliers, or sweeps over the contacts of grains, ended by themselves."""
     failed = int(content.seen["unconverged"][-1])
+    if not content.method.has_multipliers():
+        less = f"{counted_in_words(failed, 'step')} met friction, or a damper, to fewer digits than others"
+        return [Statement("friction", less, False)] if failed else []
     if failed:
         return [Statement("loops", f"{counted_in_words(failed, 'contact')} did not converge", False)]
     sweeps = float(content.seen.get("sweeps", [0])[-1])

@@ -191,3 +191,11 @@ def test_steps_of_balls_take_longer_in_a_union():
         (load,) = outlook._loads(task_of(scene, balls, swarm.Penalty(dt=1e-4, penalty=1e3), RunOptions(until=1.0)))
         costs.append(load.cost)
     assert costs[1] == pytest.approx(3.0 * costs[0])
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(0.34, "0.3 s"), (9.7, "10 s"), (10.4, "10 s"), (119.0, "119 s"), (7100.0, "120 min"), (86400.0 * 123, "120 d")],
+)
+def test_times_are_in_plain_digits(seconds, words):
+    assert outlook._about(seconds) == words

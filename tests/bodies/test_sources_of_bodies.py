@@ -1,11 +1,14 @@
 """Bodies that are born during a run: where, when and how they come, and the books of their energy."""
 
+import math
+
 import numpy as np
 import pytest
 from cut_short import in_sessions
 from energy_books import booked
 
 import swarm
+from swarm.bodies import births
 from swarm.bodies.body_run import BodyRun
 
 ROOM = swarm.Box((0.5, 0.6, 0.7))
@@ -120,3 +123,20 @@ def test_a_source_that_does_not_fit_the_body_is_refused():
         swarm.SceneError, match="sources must be left out with a body that has anchors or guides, got 1"
     ):
         swarm.simulate(scene, start, swarm.Impact(dt=0.01), until=1.0, sources=[source()])
+
+
+def test_how_births_are_turned_is_rounded_term_by_term_and_not_by_blas():
+    """Its last bit depends on the processor: the matrix of a quaternion is that of Python's floats, to the last one."""
+    axes = swarm.Body([*(0.125 * np.eye(3)), *(-0.125 * np.eye(3))], mass=1.0)
+    scene, start = swarm.Scene([ROOM]), swarm.Bodies(axes, axes.points.T, np.zeros((3, 6)))
+    # Its places are no more than 1e-60 m from the origin, and are not seen beside its points.
+    born = births.with_born(scene, start, (source(swarm.Sphere(1e-60), times=[0.01 * k for k in range(20)]),), 5, 0.5)
+    for number in range(1, 21):
+        parts = births.stream(5, 0, births._TURNS, number).standard_normal(4).tolist()
+        w, x, y, z = (part / math.sqrt(sum(one * one for one in parts)) for part in parts)
+        columns = (
+            (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
+            (2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)),
+            (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)),
+        )
+        assert tuple(map(tuple, (8.0 * born.position[:, :3, number].T).tolist())) == columns

@@ -1,5 +1,6 @@
 """Hard balls in a union of several rooms, whose edges they turn about."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 import swarm
 from swarm.kernel.vector import Vec
-from swarm.surfaces.balls import joined_faces
+from swarm.surfaces.balls import joined_faces, joined_rooms
 from swarm.surfaces.rotation import matrix
 
 BOXES = swarm.Union([swarm.Box((0.5, 0.5, 0.5)), swarm.Box((0.6, 0.2, 0.25), (0.9, 0.1, 0.05))])
@@ -70,13 +71,13 @@ def test_a_ball_flies_over_the_middle_of_a_room_to_the_other_wall():
 def test_a_flight_takes_few_looks_at_the_walls_and_none_beyond_them(name, monkeypatch):
     """Looks and bisections to each wall, without those that another one comes before."""
     looks, nearest = [], joined_faces.nearest
-    look = joined_faces._look
+    look = joined_faces.JoinedFaces.look
 
     def counted(*arguments):
         looks.append(arguments)
         return look(*arguments)
 
-    monkeypatch.setattr(joined_faces, "_look", counted)
+    monkeypatch.setattr(joined_faces.JoinedFaces, "look", counted)
     monkeypatch.setattr(joined_faces, "nearest", lambda *arguments: looks.append(arguments) or nearest(*arguments))
     random, walls = np.random.default_rng(2), walls_of(UNIONS[name], 0.05)
     with np.errstate(all="ignore"):
@@ -89,8 +90,10 @@ def test_a_flight_takes_few_looks_at_the_walls_and_none_beyond_them(name, monkey
 @pytest.mark.parametrize("pull", [None, (0.5, 1.0, -3.0)], ids=["straight", "fall"])
 def test_a_flight_within_one_room_is_found_at_one_look(pull, monkeypatch):
     """It is that in the room alone, and other walls of the union are not met."""
-    looks, look = [], joined_faces._look
-    monkeypatch.setattr(joined_faces, "_look", lambda *arguments: looks.append(arguments) or look(*arguments))
+    looks, look = [], joined_faces.JoinedFaces.look
+    monkeypatch.setattr(
+        joined_faces.JoinedFaces, "look", lambda *arguments: looks.append(arguments) or look(*arguments)
+    )
     random, radius, count = np.random.default_rng(2), 0.05, 0
     walls, alone = walls_of(BOXES, radius), walls_of(BOXES.parts[0], radius)
 
@@ -317,3 +320,12 @@ def test_the_bend_of_an_edge_is_that_of_its_circle_and_none_where_walls_touch():
 
     assert edge(0.4, 0.3).bend_at(Vec(0.3, 0.4, 0.0)) == pytest.approx(0.4, rel=1e-14)
     assert edge(0.25, 0.25).bend_at(Vec(0.5, 0.0, 0.0)) == math.inf
+
+
+def test_the_gradient_of_rooms_that_turn_is_that_of_their_union():
+    motion = swarm.Rotation((0.0, 0.0, 1.0), rate=2.0, center=(0.1, 0.0, 0.0))
+    turning = dataclasses.replace(BOXES, motion=motion)
+    points = np.random.default_rng(3).uniform(-1.0, 1.0, (3, 50))
+    for time in (0.0, 0.4):
+        there = joined_rooms.joined_rooms_of(turning).gradient(points, time)
+        assert there == pytest.approx(turning.gradient(points, time), abs=1e-15)

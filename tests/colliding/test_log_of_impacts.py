@@ -46,6 +46,17 @@ def test_a_log_that_is_full_goes_on_in_the_next_one(tmp_path, monkeypatch, optio
     assert len(table) > 10
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_the_impulse_of_a_collision_is_along_the_line_of_centres(tmp_path, friction):
+    scene, start = gas(n=20, restitution=0.9, friction=friction)
+    start.volume = 8.0
+    run, table, _counts = logged(tmp_path, scene, start)
+    met = table[table["partner"] >= 0]
+    virial = (met["impulse"] * (start.radius[met["particle"]] + start.radius[met["partner"]])).sum()
+    kinetic, pressure = (run.observables[name] for name in ("kinetic_energy", "pressure"))
+    assert pressure[-1] == pytest.approx((kinetic.sum() + virial / 0.5) / (3.0 * 8.0), rel=1e-12)
+
+
 def test_rows_of_some_balls_only(tmp_path):
     scene, start = gas(n=20)
     _run, table, _counts = logged(tmp_path, scene, start)
@@ -58,3 +69,17 @@ def test_impacts_of_members_are_counted():
     scene, start = gas(n=20)
     seen = swarm.simulate(scene, start, swarm.Impact(), until=0.5, compile="never", member_impacts=True)
     assert seen.observables["member_impacts"][-1].sum() == seen.observables["impacts"][-1] > 5
+
+
+def test_a_cell_without_a_surface_has_a_log(tmp_path):
+    _scene, start = gas(n=20, period=(2.0, 2.0, 2.0))
+    counters = [swarm.Plane((0.0, 0.0, 1.0), 1.1)]
+    run, table, counts = logged(tmp_path, swarm.Scene([], period=(2.0, 2.0, 2.0)), start, counters=counters)
+    met = table["partner"] >= 0
+    assert len(counts) == 0
+    assert met.sum() == run.observables["collisions"][-1] > 3
+    assert (table["surface"] == -1).all()
+    assert (table["member"] == -1).all()
+    crossed = [(table["sense"][~met] == sense).sum() for sense in (0, 1)]
+    assert crossed == run.observables["crossings"][-1, 0].tolist()
+    assert min(crossed) > 0

@@ -67,6 +67,38 @@ def test_what_comes_first_is_what_differs(folder):
     assert "energy_error" not in names  # round-off
 
 
+def test_counts_of_what_leaves_and_crosses_are_seen_beside_the_energies_of_balls(tmp_path):
+    """They are what such a sweep is made for, and six observables of balls differ between any two runs."""
+    text = """
+        [particles]
+        count = 6
+        radius = 0.05
+        speed = 1.0
+        [pairs]
+        restitution = 0.9
+        [[surface]]
+        kind = "box"
+        half_widths = [0.5, 0.5, 0.5]
+        restitution = 0.9
+        [[surface.openings]]
+        kind = "sphere"
+        radius = 0.3
+        center = [0.0, 0.0, 0.5]
+        [[counter]]
+        surface = { kind = "plane", normal = [1.0, 0.0, 0.0] }
+        [run]
+        until = 1.0
+        compile = "never"
+        [sweep]
+        "particles.seed" = { range = 4 }
+    """
+    (tmp_path / "leaky.toml").write_text(text)
+    swarm.sweep(tmp_path / "leaky.toml", tmp_path / "leaky", processes=1)
+    names = curves.main_observables(found(tmp_path / "leaky"))
+    assert names[:3] == ["escaped", "crossings_0_0", "crossings_0_1"]
+    assert "kinetic_energy" in names
+
+
 def test_a_sweep_that_is_not_complete_and_a_run_that_failed_say_so(folder, tmp_path, words):
     copy = tmp_path / "copy"
     shutil.copytree(folder, copy)

@@ -1,5 +1,6 @@
 """Resistance to rolling of soft balls: closed forms of one ball, and what is conserved."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -149,3 +150,19 @@ def test_a_ball_on_a_turntable_rolls_on_a_circle():
     circle = speed / (2.0 / 7.0 * rate)
     place = [0.3 - circle + circle * math.cos(turned), circle * math.sin(turned)]
     assert end.position[:2, 0] == pytest.approx(place, abs=2e-5 * circle)
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_the_floor_of_rooms_that_join_resists_as_that_of_one_room(whole):
+    laws = {"restitution": 0.5, "friction": 0.8, "rolling": 0.1}
+    mine, common = ({}, laws) if whole else (laws, {})
+    halves = [swarm.Box((0.2, 0.1, 0.1), (x, 0.0, 0.1), **mine) for x in (-0.1, 0.1)]
+    ends = []
+    for room in (swarm.Union(halves, **common), swarm.Box((0.3, 0.1, 0.1), (0.0, 0.0, 0.1), **laws)):
+        run = simulate(swarm.Scene([room], gravity=(0.0, 0.0, -G)), ball(0.02), 0.04, every=0.04)
+        ends.append((run.particles.position, run.particles.spin))
+    np.testing.assert_allclose(*ends, atol=1e-12)
+    assert np.abs(ends[0][1]).max() < 1e-9
+    odd = [halves[0], dataclasses.replace(halves[1], rolling=0.2)]
+    with pytest.raises(swarm.SceneError, match="the parts differ in rolling"):
+        simulate(swarm.Scene([swarm.Union(odd, rolling=0.0)], gravity=(0.0, 0.0, -G)), ball(0.02), 0.1)

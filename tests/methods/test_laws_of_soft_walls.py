@@ -9,6 +9,11 @@ from energy_books import unbooked
 from same_bits import require_same
 
 import swarm
+from swarm.contact import corner
+from swarm.contact.discrete_gradient import Composite
+from swarm.contact.impulse import Step
+from swarm.contact.regularisation import Linear
+from swarm.kernel.vector import Vec
 from swarm.run.doors import DoorRun
 
 ALPHA = 4e3
@@ -91,6 +96,17 @@ def test_points_are_absorbed_or_wait(name):
     assert waited / 5e-3 == pytest.approx(round(waited / 5e-3), abs=1e-6) or name == "cut"
 
 
+def test_what_another_wall_stores_of_a_point_that_is_absorbed_is_lost():
+    floor, side = swarm.Plane((0.0, 0.0, -1.0), 0.0, laws=[swarm.Absorb(1.0)]), swarm.Plane((1.0, 0.0, 0.0), 0.1)
+    scene, method = swarm.Scene([floor, side]), swarm.Penalty(1e-3, ALPHA)
+    end = ran(scene, swarm.Particles((0.0, 0.0, 0.1), (0.8, 0.0, -1.0)), method)
+    seen, inside = end.observables, end.particles.position[0, 0] - 0.1
+    assert inside > 5e-3
+    assert seen["contact_energy"][-1] == 0.0
+    assert seen["dissipated_energy"][-1] == pytest.approx(0.5 * ALPHA * inside**2, rel=1e-12)
+    assert max(balanced(seen), seen["energy_error"].max()) < 1e-14
+
+
 def test_what_slides_under_its_weight_is_rubbed():
     # v = v0 - mu g t, to rest at v0/(mu g), by contacts that last 2 pi/sqrt(alpha/m) each.
     floor = swarm.Plane((0.0, 0.0, -1.0), 0.0, friction=0.2)
@@ -114,16 +130,25 @@ def test_a_particle_that_has_bounced_to_rest_presses_by_its_weight():
     assert math.isclose(seen["dissipated_energy"][-1], 1.0, rel_tol=1e-3)
 
 
+def rows_of(path):
+    with swarm.load_impacts(path) as log:
+        return log.table()
+
+
 def test_a_wall_that_goes_leaves_the_contact_with_another_one(tmp_path):
-    """That one is on its way out then, and has its losses and its row all the same."""
+    """That one is on its way out then, and has its losses and its row all the same; the other has what it has given."""
     goes = swarm.Plane((1.0, 0.0, 0.0), 0.5, present=[(0.0, 0.14)])
     scene = swarm.Scene([goes, swarm.Plane((0.0, 1.0, 0.0), 0.4, restitution=0.5)])
     start = swarm.Particles((0.38, 0.3, 0.0), (1.0, 1.0, 0.0))
     result = ran(scene, start, PENALTY, 0.19, 0.19, impacts=tmp_path / "log.h5")
     assert balanced(result.observables) < 1e-13
     assert result.particles.velocity[1, 0] == pytest.approx(-0.5, abs=1e-12)
-    with swarm.load_impacts(tmp_path / "log.h5") as log:
-        assert log.table()["impulse"] == pytest.approx([1.5], abs=1e-12)
+    rows = rows_of(tmp_path / "log.h5")
+    assert rows["surface"].tolist() == [0, 1]
+    assert rows["impulse"] == pytest.approx(result.observables["impulse"][-1], rel=1e-12)
+    assert rows["impulse"][1] == pytest.approx(1.5, abs=1e-12)
+    assert rows["time"][0] == pytest.approx(0.14, abs=1e-12)
+    assert np.array_equal(rows["velocity_before"][0], rows["velocity_after"][0])
 
 
 def test_what_friction_stops_in_an_edge_ends_its_contact_at_both_faces(tmp_path):
@@ -196,21 +221,103 @@ def test_a_run_in_many_sessions_has_the_same_bits(tmp_path, monkeypatch):
     require_same(parts, whole)
 
 
+def edge(degrees, gravity=None, **laws):
+    """The scene of two planes that meet along y at the origin, and their normals."""
+    sine, cosine = math.sin(math.radians(degrees / 2.0)), math.cos(math.radians(degrees / 2.0))
+    n = np.array([[-sine, 0.0, cosine], [-sine, 0.0, -cosine]])
+    return swarm.Scene([swarm.Plane(tuple(one), 0.0, **laws) for one in n], gravity=gravity), n
+
+
+def into_edge(degrees, parts, along=0.0):
+    """Particles 0.1 m from the edge, at such parts of the way from its middle to a wall, that fly into it."""
+    rest = np.zeros(len(parts))
+    height = 0.1 * math.tan(math.radians(degrees / 2.0)) * np.array(parts)
+    return swarm.Particles(np.array([rest + 0.1, rest, height]), np.array([rest - 1.0, rest + along, rest]))
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("degrees", [30.0, 60.0, 90.0, 120.0])
 def test_a_contact_that_the_other_face_of_an_edge_prolongs_is_one(tmp_path, degrees, friction):
     """On its way out of one face the other pushes the particle into it again: the row has the impulse of both ways."""
-    sine, cosine = math.sin(math.radians(degrees / 2.0)), math.cos(math.radians(degrees / 2.0))
-    n = np.array([[-sine, 0.0, cosine], [-sine, 0.0, -cosine]])
-    walls = [swarm.Plane(tuple(one), 0.0, restitution=0.5, friction=friction) for one in n]
-    height = np.array([0.06, 0.17, 0.6]) * 0.1 * sine / cosine
-    rest = np.zeros(height.size)
-    start = swarm.Particles(np.array([rest + 0.1, rest, height]), np.array([rest - 1.0, rest + 0.3, rest]))
-    method = swarm.Penalty(1e-3, ALPHA)
-    seen = ran(swarm.Scene(walls, gravity=None), start, method, 1.0, impacts=tmp_path / "log.h5").observables
-    with swarm.load_impacts(tmp_path / "log.h5") as log:
-        rows = log.table()
+    scene, n = edge(degrees, restitution=0.5, friction=friction)
+    start, method = into_edge(degrees, (0.06, 0.17, 0.6), 0.3), swarm.Penalty(1e-3, ALPHA)
+    seen = ran(scene, start, method, 1.0, impacts=tmp_path / "log.h5").observables
+    rows = rows_of(tmp_path / "log.h5")
     assert np.bincount(rows["surface"], rows["impulse"]) == pytest.approx(seen["impulse"][-1], rel=1e-12)
     before, after = (np.sum(rows[f"velocity_{way}"] * n[rows["surface"]], 1) for way in ("before", "after"))
     assert after == pytest.approx(-0.5 * before, abs=1e-12)
     assert balanced(seen) < 1e-13
+
+
+@pytest.mark.parametrize(
+    ("degrees", "gravity", "laws"),
+    [
+        (45.0, None, {"restitution": 0.0}),
+        (90.0, None, {"restitution": 0.0, "friction": 0.3, **LAWS["hot"]}),
+        (120.0, (2.0, 0.0, 0.0), LAWS["Lambert"]),
+        (150.0, None, {"friction": 0.3, **LAWS["CercignaniLampis"]}),
+        (45.0, (-2.0, 0.0, 0.3), {"laws": [swarm.Absorb(0.5)]}),
+    ],
+)
+def test_each_contact_in_an_edge_has_one_row_with_its_impulse(tmp_path, degrees, gravity, laws):
+    """Also where the other wall gives more of the speed away than this one, or absorbs the particle."""
+    scene, _n = edge(degrees, gravity, **laws)
+    start = into_edge(degrees, (-0.8, -0.35, -0.1, 0.03, 0.2, 0.5), 0.3)
+    seen = ran(scene, start, swarm.Penalty(1e-3, ALPHA), 1.5, impacts=tmp_path / "log.h5").observables
+    rows = rows_of(tmp_path / "log.h5")
+    assert seen["contact_energy"][-1] == 0.0
+    assert np.bincount(rows["surface"], rows["impulse"]) == pytest.approx(seen["impulse"][-1], rel=1e-12)
+    assert (rows["impulse"] > -1e-15).all()
+    assert balanced(seen) < 1e-12
+
+
+def test_a_wall_takes_no_more_of_the_speed_away_than_it_has_given(tmp_path):
+    """What a stronger push of the other wall has given stays: w1.n = -(b - c) - e c, c the impulse of this wall."""
+    e, found = 0.5, 0
+    scene, n = edge(135.0, restitution=e, friction=0.3)
+    start = into_edge(135.0, np.linspace(0.02, 0.4, 12), 0.3)
+    seen = ran(scene, start, swarm.Penalty(1e-3, ALPHA), 1.0, impacts=tmp_path / "log.h5").observables
+    for row in rows_of(tmp_path / "log.h5"):
+        before, after = (row[f"velocity_{way}"] @ n[row["surface"]] for way in ("before", "after"))
+        # w0.n = c - x and w1.n = -e c - x, at the contact's end
+        c = (before - after) / (1.0 + e)
+        x = c - before
+        assert x >= -1e-12
+        if x > 1e-9:
+            # c is all that the wall has given, of which it takes (1 - e) c.
+            assert row["impulse"] == pytest.approx(e * c, rel=1e-9)
+            found += 1
+    assert found > 0
+    assert balanced(seen) < 1e-13
+
+
+def test_a_particle_waits_at_both_walls_of_an_edge_one_after_the_other():
+    """It arrives at both in one step; how frames cut the waits changes nothing."""
+    scene, _n = edge(90.0, laws=[swarm.Sticky(0.3)])
+    ends = [ran(scene, into_edge(90.0, (0.0,)), PENALTY, 2.0, every) for every in (2.0, 0.25)]
+    assert ends[0].observables["impacts"][-1] == 1
+    assert ends[1].particles.position == pytest.approx(ends[0].particles.position, abs=1e-12)
+
+
+def test_reactions_that_all_but_cancel_are_solved_to_their_round_off():
+    """In an acute edge they are larger than what they leave of the step."""
+    walls = edge(30.0)[0].compiled(apart="fixed steps").walls().at(0.0)
+    r, p = (
+        Vec(-6.009289371619319e-6, 0.0, -1.666203725259684e-9),
+        Vec(-7.18614933270012e-6, 0.0, -2.3170131893297707e-7),
+    )
+    free = Step(r, p, 3.514941291676031e-6)
+    reactions = np.empty((2, 4))
+    end = corner.hold(Composite(), Linear(2.501877216840645e6), None, walls, free, reactions)
+    assert end.solved
+    assert end.r == free.r + (free.p - corner.total(reactions))
+
+
+def test_a_particle_comes_to_rest_in_an_acute_edge():
+    """Its speed is round-off of its energy then, which a step restores without more of it."""
+    scene, _n = edge(75.0, (-2.0, 0.0, 0.1), restitution=0.0, friction=0.3)
+    start = swarm.Particles((0.16725548, 0.0, -0.10966131), (-0.8365939, 0.0, 0.54782385))
+    dt = 2.3847857755914964e-3
+    result = ran(scene, start, swarm.Penalty(dt, 3.93915451064637e5), 294 * dt, 294 * dt)
+    assert balanced(result.observables) < 1e-13
+    assert np.linalg.norm(result.particles.velocity) < 1e-6

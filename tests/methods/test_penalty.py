@@ -190,6 +190,7 @@ def test_impacts_count_entries():
         ({"dt": 1e-3, "penalty": "stiff"}, ["penalty", "'stiff'"]),
         ({"dt": 1e-3, "penalty": 1.0, "exponent": 0.9}, ["exponent", "1 or more", "got 0.9"]),
         ({"dt": 1e-3, "penalty": 1.0, "gradient": "composit"}, ["gradient", "'composite'", "did you mean"]),
+        ({"dt": 1e-3, "penalty": 1.0, "friction_tolerance": 0.0}, ["friction_tolerance", "from 1e-10 to 1", "got 0"]),
     ],
 )
 def test_errors_name_the_argument(arguments, parts):

@@ -337,7 +337,7 @@ def test_some_frames_and_particles(stored, tmp_path):
         ),
         ({"frames": 6}, r"frames must lie between -6 and 5, got 6"),
         ({"frames": 1.5}, r"frames must be a whole number, got 1\.5"),
-        ({"frames": slice(7, 9)}, r"frames must hold one of the frames 0 to 5"),
+        ({"frames": slice(7, 9)}, r"frames must hold one of the frames 0 to 5, got 7:9$"),
         ({"frames": slice(0, 5, 0)}, r"a step other than 0"),
         ({"particles": 0}, r"particles must be 1 or more, got 0"),
         ({"surfaces": 1}, r"surfaces must be true or false, got 1"),

@@ -90,9 +90,7 @@ def test_an_older_file_stays_and_nothing_else(folder, size_of, form, part):
     # An empty file is replaced by any kind.
     (folder / f"out.{form}").touch()
     before = {one.name: one.stat().st_size for one in folder.iterdir()}
-    # A picture always replaces an older one.
-    anyway = [] if form == "png" else ["--overwrite"]
-    require_one_sentence(python("-m", "swarm", *command, *anyway, cwd=folder, file_size=room))
+    require_one_sentence(python("-m", "swarm", *command, "--overwrite", cwd=folder, file_size=room))
     assert {one.name: one.stat().st_size for one in folder.iterdir()} == before
 
 

@@ -6,6 +6,7 @@ Everything random is compared within three standard errors, for one seed.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -170,6 +171,26 @@ def test_heat_flows_between_plates():
     # A trip at a time, without the noise of how many there are: half of the impacts of each are on the hot plate.
     noise = math.sqrt(2.0 * n * trips * (HOT**2 + COLD**2)) + n * quantum
     assert abs(hot - quantum * impacts.sum()) <= ERRORS * noise
+
+
+def test_heat_flows_between_plates_that_accommodate_a_part():
+    """Of what leaves a plate 1/(2 - a) had its last diffuse reflection there, the rest at the other one.
+
+    So a round trip, of the same mean time, carries a/(2 - a) of the heat. The start has to be stationary: what is slow
+    crosses seldom, and from another start the flux of heat is off by some part of a crossing over the time.
+    """
+    n, trips, a = 20_000, 20, 0.5
+    gas, random = stationary(n), np.random.default_rng(1)
+    mirrored = random.random(n) < (1.0 - a) / (2.0 - a)
+    gas.velocity[0, mirrored] *= -1.0
+    plates = swarm.Scene([replace(plate, accommodation=a) for plate in PLATES.surfaces])
+    until = trips * WIDTH * math.sqrt(0.5 * math.pi) * (1.0 / spread(COLD) + 1.0 / spread(HOT))
+    result = swarm.simulate(plates, gas, swarm.Impact(), until=until, every=until / 20.0, threads=1)
+    cold, hot = np.diff(result.observables["wall_heat"], axis=0).T
+    flux = 0.5 * (hot - cold) * 20.0 / (2.0 * (HOT - COLD) * n * trips * a / (2.0 - a))
+    noise = flux.std(ddof=1) / math.sqrt(20.0)
+    assert noise < 4e-3
+    assert abs(flux.mean() - 1.0) <= ERRORS * noise
 
 
 def test_the_gas_between_plates_is_stationary():

@@ -164,6 +164,13 @@ def test_a_source_whose_bounds_miss_the_vessel_is_refused_before_points_are_draw
     assert len(drawn) == (3 if sentence == "are; move it" else 0)
 
 
+def test_a_part_of_a_wall_that_is_open_has_no_births(monkeypatch):
+    monkeypatch.setattr(places, "_MOST_BATCHES", 1)
+    within = swarm.Sphere(0.05, (0.0, 0.0, 0.5))
+    with pytest.raises(swarm.SceneError, match=r"of which 0 of .*: for births in an opening give that one as where="):
+        run(OPENED, swarm.Source(0, within=within, **GIVEN))
+
+
 def test_bounds_refuse_no_source_that_has_a_place():
     """At the faces of a cell that repeats, around its vessel, on it, and where it is open to infinity."""
     cell = swarm.Scene([swarm.Sphere(0.3, (0.0, 0.5, 0.5), side="outside")], period=(1.0, 1.0, 1.0))

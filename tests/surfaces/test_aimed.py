@@ -45,16 +45,32 @@ def aimed_hit(walls, flight):
     """The hit that is proven, or None."""
     course = course_of(walls)
     with np.errstate(all="ignore"):
+        aim.put_angles(walls, course, 0, flight[2])
+        aim.put_waves(walls, course, 0, False)
         aim.start(walls, None, course, 0, *flight)
+        if aim.lacks_passages(walls):
+            aim.guess_by_levels(walls, None, course, 0, *flight)
         for _round in range(aim.AIMS):
-            aim.put_waves_at_guess(walls, course, 0, flight[2], False)
-            aim.improve(walls, None, course, 0, *flight)
-        aim.put_waves_at_guess(walls, course, 0, flight[2], True)
-        aim.prove(walls, None, course, 0, *flight, False)
-        if aim.is_open(course, 0, flight[2]) and aim.has_series(walls):
-            aim.start_series(walls, None, course, 0, *flight)
-            aim.prove(walls, None, course, 0, *flight, True)
+            put_levels_at_guess(walls, course, flight, False)
+            aim.improve(course, 0, flight[2])
+        prove_at_guess(walls, course, flight)
         return None if aim.is_open(course, 0, flight[2]) else strides.met(course, 0)
+
+
+def put_levels_at_guess(walls, course, flight, is_last):
+    aim.put_angles_at_guess(walls, course, 0, flight[2])
+    aim.put_waves(walls, course, 0, not is_last)
+    aim.put_levels(walls, None, course, 0, *flight, is_last)
+
+
+def prove_at_guess(walls, course, flight):
+    put_levels_at_guess(walls, course, flight, True)
+    aim.put_way(course, 0)
+    aim.put_ends(walls, None, course, 0, *flight)
+    aim.prove(walls, None, course, 0, *flight, False)
+    if aim.is_open(course, 0, flight[2]) and aim.has_series(walls):
+        aim.start_series(walls, None, course, 0, *flight)
+        aim.prove(walls, None, course, 0, *flight, True)
 
 
 def strode_hit(walls, flight):
@@ -165,6 +181,23 @@ def test_a_flight_outwards_from_beyond_the_mean_planes_is_proven(speed):
     assert found.wall == wanted.wall
     assert found.time == pytest.approx(wanted.time, rel=1e-11, abs=1e-13)
     assert 0.0 < found.time < 0.06 / speed
+
+
+def test_no_guess_proves_what_is_no_root():
+    """Next to the hit: the last step from there leaves the cube of its length."""
+    walls = swarm.Scene([swarm.Sphere(0.5, motion=MOTIONS["fast swing"])]).compiled().walls(START + SPAN)
+    flight, proven = (vec((0.0, 0.0, 0.0)), vec((1.5, 0.5, 0.0)), SPAN), 0
+    hit = strode_hit(walls, flight)
+    for off in np.linspace(-6e-5, 6e-5, 61):
+        course = course_of(walls)
+        with np.errstate(all="ignore"):
+            aim.start(walls, None, course, 0, *flight)
+            course[aim.GUESS, 0] = hit.time + off
+            prove_at_guess(walls, course, flight)
+        if course[strides.MET, 0] >= 0.0:
+            proven += 1
+            assert course[strides.TIME, 0] == pytest.approx(hit.time, rel=0.0, abs=1e-15)
+    assert 0 < proven < 61
 
 
 def test_lanes_without_a_proof_step_side_by_side_as_each_would_alone(monkeypatch):

@@ -23,7 +23,7 @@ from .clock import COLLISIONS, EPOCHS, EVENTS, LENGTH, REACH, SAME, fit, moment_
 from .followed import come_over, follow
 from .heavy import first_number
 from .meet import met
-from .next_collision import find_partner, find_wall, forget_wall, look_ahead, tell_partner
+from .next_collision import between, find_partner, find_wall, forget_wall, look_ahead, tell_partner
 from .queue import FIRST, build, requeue
 from .rows import DUE, FLOATS, LEAVES, MEETS, MET, NO_PARTNER, PARTNER, SEEN, STAMP, TIME, WHOLES
 from .striking import renew_ended, shift_leases, strike_heavy
@@ -60,7 +60,7 @@ def _collide(box, flock, books, clock, i, now):
         if box.repose is not None:
             box.repose.count(clock, square((blow.other - blow.one) - (w - v)), now)
         if box.watchers.log is not None:
-            impulse, after = box.kinds.mass_of(one) * norm(blow.one - v), blow.one
+            impulse, after = blow.virial / norm(between(box.grid, r, there)), blow.one
             if flock.holds is not None:
                 held, leaves = flock.is_held(one, now), flock.velocity(one)
                 v, after = either(held, leaves, v), either(held, leaves, after)

@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from ...contact.touching import ParticleMoment as ParticleMoment
 from ...kernel.arrays import index
 from ...kernel.gravity import accelerated, displacement
 from ...kernel.jit import outlined, select
@@ -27,14 +28,6 @@ class Flown(Record):
     remaining: Any
     end: Vec
     images: Vec  # of the cell, from that where the particle is booked
-
-
-class ParticleMoment(Record):
-    """A particle at a moment, with so much of the frame left."""
-
-    r: Vec
-    v: Vec
-    remaining: Any
 
 
 @outlined

@@ -14,21 +14,21 @@ from ...methods import Impact
 from ...scene import Scene
 from ...surfaces.instant import are_there_together, box_of, gaps_of, side_of
 from ...surfaces.presence.openings import least_distance
-from ...surfaces.surface import Surface
+from ...surfaces.surface import LAWS, Surface
 from ..options import Task
 from . import softness, workload
 
 _LOG = logging.getLogger("swarm")
 # A run warns of a step, a contact and a round-off of a time above these parts of the time between impacts.
 _STEP, _CONTACT, _ROUND_OFF = 0.25, 0.5, 1e-4
-# The time between impacts is computed only if a step, a contact or a round-off is longer than this fraction of its part
-# (above) of the time that a crossing of the scene takes.
+# The time between impacts takes long to compute: it is asked for only where a step, a contact or a round-off is longer
+# than this fraction of what it may be if that time were the time to cross the scene.
 _SURELY = 1e-2
 # Explicit steps of a spring are stable up to this number over its angular frequency.
 _STABLE = 2.0
 # The number of particles in a sample.
 _LOOKED_AT = 1000
-# Two cavities are compared at so many points; a larger part of one beyond the other says that they cut one another.
+# Two cavities are compared at so many points. They cut one another if more than this part of each is outside the other.
 _POINTS, _CUT = 4096, 0.01
 _IN_ONE_PLACE = (
     "%s and %s have faces in one place, with the same side: an impact there follows the "
@@ -39,8 +39,6 @@ _ONLY_TOUCH = (
     "or hit the edge of the face, may enter the gap of no width between them; let them overlap, as a post that goes on "
     "below its floor, or make one body of tiles in a row"
 )
-# What an impact on a surface depends on, besides its shape.
-_LAWS = ("restitution", "friction", "rolling", "temperature", "accommodation", "laws", "mass", "inertia")
 
 
 def give(task: Task) -> None:
@@ -73,7 +71,7 @@ def _some(count: int) -> slice:
 
 
 def _takes_energy(compiled: CompiledScene) -> bool:
-    """Whether impacts on walls, or of pairs, may take what gravity gives."""
+    """Whether impacts on walls, or of pairs, may take the energy that gravity gives."""
     pairs, laws = compiled.scene.pairs, compiled.laws
     walls_may = laws is not None and (compiled.scene.moves() or not laws.keep_speed())
     return (pairs is not None and pairs.restitution < 1.0) or walls_may
@@ -152,7 +150,7 @@ def _warn_of_rest(task: Task) -> None:
 
 
 def _warn_of_times(task: Task, crossing: float) -> None:
-    """Warn where the last times of a run are so late that float64 does not tell those of impacts apart."""
+    """Warn where a run is so long that float64 does not resolve the times of its last impacts."""
     scene, until = task.scene, task.options.until
     every = task.options.times.every
     assert every is not None
@@ -278,7 +276,7 @@ def _named(surfaces: Sequence[Surface], number: int, row: int | None) -> str:
 
 def _differ(one: Surface, other: Surface) -> bool:
     """Whether impacts on two surfaces differ."""
-    return any(getattr(one, name, None) != getattr(other, name, None) for name in _LAWS)
+    return any(getattr(one, name, None) != getattr(other, name, None) for name in (*LAWS, "mass", "inertia"))
 
 
 def _cut_one_another(one: Surface, other: Surface, boxes: NDArray[np.float64]) -> bool:

@@ -472,6 +472,11 @@ CAPABILITIES = (
         ),
         (GRAINS,): Refusal('gradient must be "composite" where particles have a radius, got "{got}"', "leave it out"),
     }, True),
+    Capability("friction_tolerance", _given("method.friction_tolerance", 0.02), {
+        (SOFT, SOFT_BODIES): Refusal(
+            "friction_tolerance must be left out without particles that have a radius, got {got}", "leave it out"
+        ),
+    }, True),
     Capability("acceleration", _given("method.acceleration", "none"), {
         (PAPER_BODIES,): Refusal('acceleration of {method} must be "none" with bodies, got "{got}"', "leave it out"),
     }, True),

@@ -21,6 +21,7 @@ from ...kernel.limits import EPSILON, TINY
 from ...kernel.vector import ZERO, Symmetric, Vec, dot, norm, square, total
 from .. import contract
 from ..time_of_impact.course import rise_time
+from .at_radius import AtRadius
 from .foot_hit import applied, first_impact, inverse, matrix
 
 # Newton's steps to a foot; near it each one doubles the digits. The last one is shorter than this part of the distance.
@@ -45,7 +46,7 @@ class Foot(NamedTuple):
     sure: Any
 
 
-class ByFoot(contract.Smooth):
+class ByFoot(AtRadius):
     """What is so far within the admissible side of a wall `body`."""
 
     body: Any
@@ -58,24 +59,52 @@ class ByFoot(contract.Smooth):
 
     side = 1.0
 
-    def grown(self, radius):
-        return self._replace(radius=radius)
-
+    @outlined
     def foot(self, r):
-        """The `Foot` of a place."""
-        return _foot(self, r)
+        """The `Foot` of a place, by Newton's method for r = z - k grad f(z) and f(z) = 0; k is at most 1/(2 m)."""
+        body, side = self.body, self.side_of_body()
+        p = self.within(r)
+        f, n = side * body.phi(p), side * body.gradient(p)
+        beside = norm(r - p)
+        away, size, first = max(_free(self, r, p, f, n), beside), norm(n), f
+        # From there so far along the normal
+        ahead = rise_time(f, 0.5 * size, self.most)
+        ahead = select((ahead < math.inf) & (f < 0.0), ahead, -f / select(size > TINY, size, 1.0))
+        z = self.within(p + (ahead / select(size > TINY, size, 1.0)) * n)
+        largest = select(self.most > 0.0, 0.5 * _MOST / select(self.most > 0.0, self.most, 1.0), math.inf)
+        share, sure = 0.0, False
+        for sweep in range(_SWEEPS):
+            f, n = side * body.phi(z), side * body.gradient(z)
+            d, n2 = z - r, square(n)
+            if norm(d) <= self.known:
+                away = max(away, _free(self, r, z, f, n))
+            if sweep == 0:
+                share = min(dot(d, n) / select(n2 > TINY, n2, 1.0), largest)
+            back = inverse(matrix(self, z, share))
+            u, w = applied(back, d - share * n), applied(back, n)
+            bottom = dot(n, w)
+            after = min(share + (dot(n, u) - f) / select(abs(bottom) > TINY, bottom, 1.0), largest)
+            step = (after - share) * w - u
+            share = after
+            to = z + step
+            z = self.within(to)
+            left = abs(z.x - to.x) + abs(z.y - to.y) + abs(z.z - to.z)
+            short = _LAST * norm(d) + _STILL * total(Vec(abs(z.x) + abs(r.x), abs(z.y) + abs(r.y), abs(z.z) + abs(r.z)))
+            if norm(step) <= short:
+                sure = (left == 0.0) & (share < largest)
+                break
+        f, n = side * body.phi(z), side * body.gradient(z)
+        size = norm(n)
+        size = select(size > TINY, size, 1.0)
+        here = (dot(z - r, n) - f) / size
+        sure = sure & (here <= self.known)
+        return Foot(select(sure, here, max(_certain(self, r, first, away), beside)), n * (1.0 / size), z, share, sure)
 
     def phi(self, r):
         return self.radius - self.foot(r).away
 
     def gradient(self, r):
         return self.foot(r).normal
-
-    def distance(self, r):
-        return self.phi(r)
-
-    def unit_normal(self, r):
-        return self.gradient(r)
 
     def project(self, r):
         found = self.foot(r)
@@ -184,45 +213,3 @@ def _certain(wall, y, f, away):
     if wall.known < math.inf:
         return max(min(away, wall.known), select(f < 0.0, wall.body.clearance(y), 0.0))
     return away
-
-
-@outlined
-def _foot(wall, y):
-    """The `Foot`, by Newton's method for y = z - k grad f(z) and f(z) = 0; k is never above 1/(2 m)."""
-    body, side = wall.body, wall.side_of_body()
-    p = wall.within(y)
-    f, n = side * body.phi(p), side * body.gradient(p)
-    beside = norm(y - p)
-    away, size, first = max(_free(wall, y, p, f, n), beside), norm(n), f
-    # From there so far along the normal
-    ahead = rise_time(f, 0.5 * size, wall.most)
-    ahead = select((ahead < math.inf) & (f < 0.0), ahead, -f / select(size > TINY, size, 1.0))
-    z = wall.within(p + (ahead / select(size > TINY, size, 1.0)) * n)
-    largest = select(wall.most > 0.0, 0.5 * _MOST / select(wall.most > 0.0, wall.most, 1.0), math.inf)
-    share, sure = 0.0, False
-    for sweep in range(_SWEEPS):
-        f, n = side * body.phi(z), side * body.gradient(z)
-        d, n2 = z - y, square(n)
-        if norm(d) <= wall.known:
-            away = max(away, _free(wall, y, z, f, n))
-        if sweep == 0:
-            share = min(dot(d, n) / select(n2 > TINY, n2, 1.0), largest)
-        back = inverse(matrix(wall, z, share))
-        u, w = applied(back, d - share * n), applied(back, n)
-        bottom = dot(n, w)
-        after = min(share + (dot(n, u) - f) / select(abs(bottom) > TINY, bottom, 1.0), largest)
-        step = (after - share) * w - u
-        share = after
-        to = z + step
-        z = wall.within(to)
-        left = abs(z.x - to.x) + abs(z.y - to.y) + abs(z.z - to.z)
-        short = _LAST * norm(d) + _STILL * total(Vec(abs(z.x) + abs(y.x), abs(z.y) + abs(y.y), abs(z.z) + abs(y.z)))
-        if norm(step) <= short:
-            sure = (left == 0.0) & (share < largest)
-            break
-    f, n = side * body.phi(z), side * body.gradient(z)
-    size = norm(n)
-    size = select(size > TINY, size, 1.0)
-    here = (dot(z - y, n) - f) / size
-    sure = sure & (here <= wall.known)
-    return Foot(select(sure, here, max(_certain(wall, y, first, away), beside)), n * (1.0 / size), z, share, sure)

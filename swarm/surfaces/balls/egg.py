@@ -9,9 +9,9 @@ import math
 from ...kernel.jit import kernel, outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import Symmetric, Vec, column, dot, largest, norm, square, times
-from .. import contract
 from ..shapes.quadratic import ConvexQuadric
 from ..time_of_impact.course import rise_time_inside
+from .at_radius import AtRadius
 from .by_foot import ByFoot
 from .rounded import Rounded
 
@@ -23,7 +23,7 @@ _POLE = 1e-30
 _PART = 0.5
 
 
-class EggCavity(contract.Smooth):
+class EggCavity(AtRadius):
     """What is so far inside of an ellipsoid, in its principal frame: convex as that is, so that it is left once."""
 
     center: Vec
@@ -33,9 +33,6 @@ class EggCavity(contract.Smooth):
 
     side = 1.0
     leaves_once = True
-
-    def grown(self, radius):
-        return self._replace(radius=radius)
 
     def foot(self, r):
         """The signed distance of a point outside of the ellipsoid, and the unit normal of that at its foot."""
@@ -67,21 +64,6 @@ class EggCavity(contract.Smooth):
             entry(0, 0) + half * c.x, entry(1, 1) + half * c.y, entry(2, 2) + half * c.z,
             entry(0, 1), entry(1, 2), entry(2, 0),
         )  # fmt: skip
-
-    def distance(self, r):
-        return self.phi(r)
-
-    def unit_normal(self, r):
-        return self.gradient(r)
-
-    def far(self, r):
-        return -self.distance(r)
-
-    def out_of(self, r):
-        return -self.distance(r)
-
-    def clearance(self, r):
-        return -self.distance(r)
 
     def farthest_push(self):
         return math.inf

@@ -32,6 +32,7 @@ from ..contract import Bent, Smooth
 from ..shapes.plane import PlaneNumbers
 from ..shapes.slab import SlabNumbers
 from ..time_of_impact import march, rising
+from ..time_of_impact.flights import Hit
 
 # The most steps of Newton's method to an edge. A step no longer than this part of a place, its round-off, is the last.
 _SWEEPS, _STILL = 60, 4.0 * EPSILON
@@ -151,11 +152,38 @@ class JoinedFaces(Smooth):
         away, place = nearest(self, r)
         return r + ((away - self.radius) / select(away > 0.0, away, 1.0)) * (place - r)
 
+    @outlined
     def look(self, r, v, pull, t, is_first):
-        return _look(self, r, v, pull, t, is_first)
+        """The `SafeStep` of a flight from the time t on."""
+        p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
+        # Another wall of the union is met on the way out.
+        if not is_first and gap_of(self.rooms, p) > self.slack:
+            return march.SafeStep(t, math.inf, -1.0, -1.0)
+        room = EPSILON * total(absolute(p))
+        way = _in_rooms(self.rooms, self.radius, self.slack, AtInstant(p, w, pull), _WITHIN * room)
+        if way.wall >= 0.0:
+            is_own = False
+            for face in self.faces:
+                is_own = is_own | (face.number == way.wall)
+            return march.SafeStep(t, select(is_own, way.time, math.inf), select(is_own, 0.0, -1.0), -1.0)
+        if way.time > 0.0:
+            return march.SafeStep(t, way.time, -1.0, -1.0)
+        step = _until_any(self, AtInstant(p, w, pull), math.inf)
+        arrives = (not is_first or step == 0.0) and march.travelled(norm(w), norm(pull), step) <= 2.0 * room
+        if arrives and not is_first:
+            away, place = nearest(self, p)
+            # By more than round-off: an edge bends more than its samples say.
+            if away < self.radius - room and dot(place - p, w) > 0.0:
+                return march.SafeStep(t, 0.0, -1.0, 0.0)
+        return march.SafeStep(t, step, select(arrives, 0.0, -1.0), -1.0)
 
+    @outlined
     def moving_step(self, seen, longest):
-        return _moving_step(self, seen, longest)
+        """The `LevelStep` of the wall with all its faces, edges and tips."""
+        away, place = nearest(self, seen.r)
+        half = 0.5 * dot((place - seen.r) * (1.0 / select(away > 0.0, away, 1.0)), seen.v)
+        step = _until_any(self, AtInstantInFrame(seen.r, seen, longest), longest)
+        return rising.LevelStep(self.radius - away, half, step)
 
 
 @kernel
@@ -399,13 +427,6 @@ def _wall_hit(grown, flight):
     return grown.falling_hit(flight.r, flight.v, flight.pull)
 
 
-class WayInRooms(Record):
-    """How long a ball stays within a room, and the number of the wall that it meets then; -1 if it meets none there."""
-
-    time: float
-    number: float
-
-
 class AtInstantInFrame(Record):
     """`AtInstant` in the frame of a union that moves, with times up to the longest one [s]."""
 
@@ -435,42 +456,19 @@ class Hidden(rising.Ahead):
 
 
 @outlined
-def _look(wall, r, v, pull, t, is_first):
-    """The `SafeStep` of a flight from the time t on."""
-    p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
-    # Another wall of the union is met on the way out.
-    if not is_first and gap_of(wall.rooms, p) > wall.slack:
-        return march.SafeStep(t, math.inf, -1.0, -1.0)
-    room = EPSILON * total(absolute(p))
-    way = _in_rooms(wall.rooms, wall.radius, wall.slack, AtInstant(p, w, pull), _WITHIN * room)
-    if way.number >= 0.0:
-        is_own = False
-        for face in wall.faces:
-            is_own = is_own | (face.number == way.number)
-        return march.SafeStep(t, select(is_own, way.time, math.inf), select(is_own, 0.0, -1.0), -1.0)
-    if way.time > 0.0:
-        return march.SafeStep(t, way.time, -1.0, -1.0)
-    step = _until_any(wall, AtInstant(p, w, pull), math.inf)
-    arrives = (not is_first or step == 0.0) and march.travelled(norm(w), norm(pull), step) <= 2.0 * room
-    if arrives and not is_first:
-        away, place = nearest(wall, p)
-        # By more than round-off: an edge bends more than its samples say.
-        if away < wall.radius - room and dot(place - p, w) > 0.0:
-            return march.SafeStep(t, 0.0, -1.0, 0.0)
-    return march.SafeStep(t, step, select(arrives, 0.0, -1.0), -1.0)
-
-
-@outlined
 def _in_rooms(rooms, radius, slack, flight, near):
-    """The `WayInRooms` of a ball in the room that it stays in the longest; `near` is round-off of its place [m]."""
-    way, own, foot, before = WayInRooms(0.0, -1.0), 0, flight.r, 0.0
+    """The `Hit` of a ball with a wall of the room that it stays in the longest; the wall is -1 if it meets none there.
+
+    `near` is round-off of its place [m].
+    """
+    way, own, foot, before = Hit(0.0, -1.0), 0, flight.r, 0.0
     for k, room in enumerate(rooms):
         gap = -math.inf
         for wall in room:
             gap = max(gap, wall.distance(flight.r))
         if gap <= near - radius:
             # All of the ball is within the room, of which each wall has the ball on its side.
-            first, place = WayInRooms(math.inf, -1.0), foot
+            first, place = Hit(math.inf, -1.0), foot
             for i, wall in enumerate(room):
                 until, there = _way_to(wall, before + float(i), radius, flight)
                 if until.time < first.time:
@@ -478,25 +476,16 @@ def _in_rooms(rooms, radius, slack, flight, near):
             if first.time > way.time:
                 way, own, foot = first, k, place
         before += float(len(room))
-    is_met = way.number >= 0.0 and is_seen(rooms, (own, own), foot, slack)
-    return way._replace(number=select(is_met, way.number, -1.0))
+    is_met = way.wall >= 0.0 and is_seen(rooms, (own, own), foot, slack)
+    return way._replace(wall=select(is_met, way.wall, -1.0))
 
 
 @outlined
 def _way_to(wall, number, radius, flight):
-    """(the `WayInRooms` to one wall with this number, the foot of the ball on the wall then)."""
+    """(the `Hit` with one wall, which has this number, the foot of the ball on the wall then)."""
     time, meets = _wall_hit(wall.grown(radius), flight)
     there = flight.place(select(time < math.inf, time, 0.0))
-    return WayInRooms(time, select(meets, number, -1.0)), there - wall.distance(there) * outward(wall, there)
-
-
-@outlined
-def _moving_step(wall, seen, longest):
-    """The `LevelStep` of a wall with all its faces, edges and tips."""
-    away, place = nearest(wall, seen.r)
-    half = 0.5 * dot((place - seen.r) * (1.0 / select(away > 0.0, away, 1.0)), seen.v)
-    step = _until_any(wall, AtInstantInFrame(seen.r, seen, longest), longest)
-    return rising.LevelStep(wall.radius - away, half, step)
+    return Hit(time, select(meets, number, -1.0)), there - wall.distance(there) * outward(wall, there)
 
 
 def _until_any(wall, flight, longest):

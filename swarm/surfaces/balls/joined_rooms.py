@@ -54,9 +54,6 @@ _SWEEPS, _STILL, _PARALLEL = 30, 4.0 * EPSILON, 1e-9
 _SMOOTH, _PROJECTIONS = 1e-9, 4
 # Of no more balls it is asked in Python how far they reach outside: a kernel takes longer to compile.
 _FEW = 100
-# What all parts of a union that balls meet must have in common.
-_LAWS = "restitution", "friction", "temperature", "accommodation", "laws"
-_CHANGES = "motion", "openings", "present", "mass", "inertia"
 _KINDS = Sphere, Plane, Slab, Box, Cylinder, Cone
 
 
@@ -86,7 +83,7 @@ class JoinedRooms(Surface):
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
         return np.asarray(np.min([np.max(gaps, axis=0) for gaps in self._gaps(points, time)], axis=0))
 
-    def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
+    def _own_gradient(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
         rows, gaps = np.array(self._own_rows(points, time)), self._gaps(points, time)
         least, found = np.argmin([np.max(some, axis=0) for some in gaps], axis=0), np.zeros(np.shape(points))
         for k, (room, some) in enumerate(zip(self.rooms_of, gaps, strict=True)):
@@ -121,7 +118,7 @@ def joined_rooms_of(union: Any) -> JoinedRooms:
     """The `JoinedRooms` of a union of several rooms, or of a foam."""
     rooms = union.rooms_of_balls()
     one, still = rooms[0][0], [[replace(one.at_rest(), openings=(), present=None) for one in room] for room in rooms]
-    return JoinedRooms(rooms_of=tuple(map(tuple, still)), **{name: getattr(one, name) for name in (*_LAWS, *_CHANGES)})
+    return JoinedRooms(rooms_of=tuple(map(tuple, still)), **one.common())
 
 
 def why_no_balls_in(union: Any) -> str | None:
@@ -136,7 +133,7 @@ def why_no_balls_in(union: Any) -> str | None:
         if surface.is_solid() or not isinstance(surface, _KINDS):
             known = ", ".join(kind.__name__ for kind in _KINDS)
             return f"{begin}one is made of a {name}, and balls meet edges of rooms made of the insides of {known} alone"
-    for what in (*_LAWS, *_CHANGES):
+    for what in surfaces[0].common():
         if len({repr(getattr(surface, what)) for surface in surfaces}) > 1:
             return f"{begin}the parts differ in {what}, while an edge belongs to both: give the {what} to the whole"
     return None

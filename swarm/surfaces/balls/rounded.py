@@ -6,7 +6,7 @@ is that to the nearest of its faces.
 """
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,22 +15,19 @@ from ...kernel.jit import select
 from ...kernel.limits import PLACE, TINY
 from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot, norm, square, total
-from .. import contract
 from ..curvature import SPACING, half_hessian
 from ..time_of_impact.approach import place
 from ..time_of_impact.course import rise_time, under_way
 from ..time_of_impact.rising import plane_step
+from .at_radius import AtRadius
 
 # The last step is shorter than this fraction of the radius plus round-off of a place. The square of the fraction is
 # below round-off.
 _CLOSE = 1e-8
 
 
-class Rounded(contract.Smooth):
+class Rounded(AtRadius):
     """A solid grown by the field `radius`; it gives `foot`."""
-
-    if TYPE_CHECKING:
-        radius: Any
 
     side = -1.0
 
@@ -41,23 +38,11 @@ class Rounded(contract.Smooth):
         """
         raise NotImplementedError
 
-    def grown(self, radius):
-        return self._replace(radius=radius)
-
     def phi(self, r):
         return self.foot(r)[0] - self.radius
 
     def gradient(self, r):
         return self.foot(r)[1]
-
-    def distance(self, r):
-        return self.radius - self.foot(r)[0]
-
-    def unit_normal(self, r):
-        return -1.0 * self.foot(r)[1]
-
-    def clearance(self, r):
-        return self.foot(r)[0] - self.radius
 
     def before(self, gravity, r, v):
         """When a flight comes to the plane that is as far as the radius from the one at the foot."""

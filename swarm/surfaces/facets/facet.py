@@ -182,8 +182,14 @@ class FacetNumbers(Flat):
         time, _found = self.falling_hit(r, v, pull)
         return time
 
+    @outlined
     def moving_step(self, seen, longest):
-        return _moving_step(self, seen, longest)
+        is_behind = self.phi(seen.r) > self.room.value
+        sign = select(is_behind, -1.0, 1.0)
+        plane = PlaneNumbers(sign * self.normal, sign * self.offset)
+        overlap = self.room.value + self.corners.beyond
+        edges = tuple(PlaneNumbers(inwards, dot(inwards, start) - overlap) for start, inwards in self.edges())
+        return patch_step(plane, is_behind, edges, seen, longest)
 
     def way_past(self, seen, longest):
         """The `WayPast` of a flight for so long: one that misses is not behind it, or beyond an edge where it may be.
@@ -222,13 +228,3 @@ class SheetSide(FacetNumbers):
         # What is behind it is on the other side of the sheet, and does not meet this one.
         away = -math.sqrt(beyond * beyond + depth * depth)
         return select(depth > self.behind(), -math.inf, away)
-
-
-@outlined
-def _moving_step(facet, seen, longest):
-    is_behind = facet.phi(seen.r) > facet.room.value
-    sign = select(is_behind, -1.0, 1.0)
-    plane = PlaneNumbers(sign * facet.normal, sign * facet.offset)
-    overlap = facet.room.value + facet.corners.beyond
-    edges = tuple(PlaneNumbers(inwards, dot(inwards, start) - overlap) for start, inwards in facet.edges())
-    return patch_step(plane, is_behind, edges, seen, longest)

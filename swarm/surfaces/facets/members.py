@@ -46,8 +46,28 @@ class Facets(Members, Patched):
     def as_met(self):
         return self.like._replace(corners=None)
 
+    @outlined
     def field_hit(self, gravity, r, v):
-        return _first_hit(self, gravity, r, v)
+        """The first hit, from cell to cell, or how far the flight is surely free."""
+        cells, t = self.grid, 0.0
+        place, pace = r, v
+        for _cell in range(_MOST):
+            cell = cell_of(cells, place)
+            if cell.inside:
+                number = index(cell.number)
+                room = room_of(cells.known.room, number)
+                until = t + until_out(gravity, cells, cell.place - room.back, cell.place + room.ahead, place, pace)
+                if cells.known.room[number, KIND] == FULL:
+                    here = flight_in(cells, from_middle(cells, cell.place, place), pace, gravity, until - t)
+                    found = hit_in(self, gravity, (r, v), (number, until), here)
+                    if found.wall >= 0.0:
+                        return found
+            else:
+                until = t + until_next(gravity, cells, cell, place, pace)
+            if not until < math.inf:
+                return flights.NEVER
+            t, place, pace = until, r + displacement(gravity, v, until), accelerated(gravity, v, until)
+        return flights.Hit(t, -1.0)
 
     def tree(self):
         """What `foot_on` finds the nearest triangle of a closed mesh by."""
@@ -57,11 +77,46 @@ class Facets(Members, Patched):
     def foot(self, tree, r):
         return foot_on(self, tree, r)
 
+    @outlined
     def is_in_another(self, number, r):
-        return _is_behind_another(self, number, r)
+        first, stop = entries_at(self.grid, r)
+        for k in range(first, stop):
+            m = self.grid.entries[k]
+            if float(m) != number and member(self, index(m)).distance(r) > 0.0:
+                return True
+        return False
 
+    @outlined
     def deepest_in_cell(self, r):
-        return _deepest(self, r)
+        """The largest distance behind any facet, or that behind the nearest one that a point is before or behind.
+
+        At a sharp ridge what is before one of its facets is behind the other. Of a point that is lost behind a closed
+        mesh it is the distance from that.
+        """
+        cell = cell_of(self.grid, r)
+        first, stop = entries_of(self.grid, cell.number)
+        most, near, depth_there, ahead, behind = -math.inf, math.inf, 0.0, math.inf, math.inf
+        for k in range(first, stop):
+            facet = member(self, index(self.grid.entries[k]))
+            distance, is_behind = facet.distance(r), facet.phi(r) > facet.behind()
+            most = max(most, distance)
+            behind = select(is_behind & (-distance < behind), -distance, behind)
+            ahead = select(is_behind | (-distance >= ahead), ahead, -distance)
+        # Before all of them, as most points are
+        for k in range(first, stop if most > 0.0 else first):
+            facet = member(self, index(self.grid.entries[k]))
+            depth = facet.phi(r)
+            if abs(depth) < near and not facet.is_beyond(r, -(facet.room.value + facet.corners.beyond)):
+                near, depth_there = abs(depth), depth
+        deepest = most if most <= near else depth_there
+        if self.grid.known.boxes is not None:
+            # All facets are looked at only for a point that may be lost: not where one that it is before is as near as
+            # another.
+            is_lost = first == stop or behind < (1.0 - _NEARER) * ahead
+            is_lost = is_lost and self.grid.known.room[index(cell.number), KIND] != FREE
+            if is_lost and not self.is_gone():
+                deepest = max(deepest, foot_on(self, self.tree(), r).gap)
+        return deepest
 
     def loosened(self, reach):
         room = self.like.room.value + ROOM * reach
@@ -80,8 +135,11 @@ class Facets(Members, Patched):
     def may_meet(self, cell, k, here):
         return _passes(self.grid, cell.number, k, here)
 
+    @outlined
     def misses(self, m, seen, longest):
-        return _misses(self, m, seen, longest)
+        # What is past its plane, by however little, is asked how far.
+        facet = member(self, m)
+        return (facet.phi(seen.r) <= 0.0) & facet.way_past(seen, longest).misses
 
     def keeps(self, number, r):
         is_other = (number < 0.0) | (number >= self.count())
@@ -90,9 +148,23 @@ class Facets(Members, Patched):
     def is_there(self, number, r, near):
         return self.wall(number).is_there(r, near)
 
+    @outlined
     def gives_way(self, m, r):
-        """Whether a flight that meets the plane of a facet at r goes on, beside one that is turned the other way."""
-        return _is_nearer_to_opposite(self, m, r)
+        """Whether a flight to the plane of a facet goes on at r, which is nearer to one that is turned the other way.
+
+        Two of these meet at a saddle vertex. Each reaches beyond its edges by the round-off of places, and where both
+        do a flight between them would have no end. There the one is met to which the place belongs, or is nearer.
+        """
+        one, (first, stop) = member(self, m), entries_at(self.grid, r)
+        room, within = self.like.room.value, one.within(r)
+        # Beyond an edge, by round-off: hardly a hit is there.
+        for k in range(first, stop if one.is_beyond(r, -room) else first):
+            other = member(self, index(self.grid.entries[k]))
+            turn = cross(one.normal, other.normal)
+            is_opposite = dot(one.normal, other.normal) < 0.0 and square(turn) <= _PARALLEL * _PARALLEL
+            if is_opposite and abs(other.phi(r)) <= _ON * room and other.within(r) > within:
+                return True
+        return False
 
     def whole(self, number):
         facet = self.wall(number)
@@ -101,115 +173,19 @@ class Facets(Members, Patched):
     def is_ahead(self, number, start, end, near):
         return self.wall(number).is_ahead(start, end, near)
 
+    @outlined
     def wall_after(self, number, r, near):
-        return _on_plane_of(self, number, r, near)
-
-
-@outlined
-def _misses(facets, m, seen, longest):
-    # What is past its plane, by however little, is asked how far.
-    facet = member(facets, m)
-    return (facet.phi(seen.r) <= 0.0) & facet.way_past(seen, longest).misses
-
-
-@outlined
-def _is_behind_another(facets, number, r):
-    first, stop = entries_at(facets.grid, r)
-    for k in range(first, stop):
-        m = facets.grid.entries[k]
-        if float(m) != number and member(facets, index(m)).distance(r) > 0.0:
-            return True
-    return False
-
-
-@outlined
-def _deepest(facets, r):
-    """The largest distance behind any facet; where one that a point is before or behind is nearer, how far behind it.
-
-    At a sharp ridge what is before one of its facets is behind the other. Of a point that is lost behind a closed mesh
-    it is the distance from that.
-    """
-    cell = cell_of(facets.grid, r)
-    first, stop = entries_of(facets.grid, cell.number)
-    most, near, depth_there, ahead, behind = -math.inf, math.inf, 0.0, math.inf, math.inf
-    for k in range(first, stop):
-        facet = member(facets, index(facets.grid.entries[k]))
-        distance, is_behind = facet.distance(r), facet.phi(r) > facet.behind()
-        most = max(most, distance)
-        behind = select(is_behind & (-distance < behind), -distance, behind)
-        ahead = select(is_behind | (-distance >= ahead), ahead, -distance)
-    # Before all of them, as most points are
-    for k in range(first, stop if most > 0.0 else first):
-        facet = member(facets, index(facets.grid.entries[k]))
-        depth = facet.phi(r)
-        if abs(depth) < near and not facet.is_beyond(r, -(facet.room.value + facet.corners.beyond)):
-            near, depth_there = abs(depth), depth
-    deepest = most if most <= near else depth_there
-    if facets.grid.known.boxes is not None:
-        # All facets are looked at only for a point that may be lost: not where one it is before is as near as another.
-        is_lost = first == stop or behind < (1.0 - _NEARER) * ahead
-        is_lost = is_lost and facets.grid.known.room[index(cell.number), KIND] != FREE
-        if is_lost and not facets.is_gone():
-            deepest = max(deepest, foot_on(facets, facets.tree(), r).gap)
-    return deepest
-
-
-@outlined
-def _on_plane_of(facets, number, r, near):
-    """The facet that goes on with the plane of another one at a place, or -1."""
-    first, stop = entries_at(facets.grid, r)
-    normal, found, widest = facets.wall(number).normal, -1.0, -near
-    for k in range(first, stop):
-        m = facets.grid.entries[k]
-        other = member(facets, index(m))
-        turn, within = cross(normal, other.normal), other.within(r)
-        is_flat = dot(normal, other.normal) > 0.0 and square(turn) <= _PARALLEL * _PARALLEL
-        if float(m) != number and is_flat and abs(other.phi(r)) <= _ON * facets.like.room.value and within > widest:
-            found, widest = float(m), within
-    return found
-
-
-@outlined
-def _is_nearer_to_opposite(facets, m, r):
-    """Whether a place on the plane of a facet is nearer to one on that plane of which the other side is admissible.
-
-    Two of these meet at a saddle vertex. Each reaches beyond its edges by the round-off of places, and where both do a
-    flight between them would have no end. There the one is met to which the place belongs, or is nearer.
-    """
-    one, (first, stop) = member(facets, m), entries_at(facets.grid, r)
-    room, within = facets.like.room.value, one.within(r)
-    # Beyond an edge, by round-off: hardly a hit is there.
-    for k in range(first, stop if one.is_beyond(r, -room) else first):
-        other = member(facets, index(facets.grid.entries[k]))
-        turn = cross(one.normal, other.normal)
-        is_opposite = dot(one.normal, other.normal) < 0.0 and square(turn) <= _PARALLEL * _PARALLEL
-        if is_opposite and abs(other.phi(r)) <= _ON * room and other.within(r) > within:
-            return True
-    return False
-
-
-@outlined
-def _first_hit(facets, gravity, r, v):
-    """The first hit, from cell to cell, or how far the flight is surely free."""
-    cells, t = facets.grid, 0.0
-    place, pace = r, v
-    for _cell in range(_MOST):
-        cell = cell_of(cells, place)
-        if cell.inside:
-            number = index(cell.number)
-            room = room_of(cells.known.room, number)
-            until = t + until_out(gravity, cells, cell.place - room.back, cell.place + room.ahead, place, pace)
-            if cells.known.room[number, KIND] == FULL:
-                here = flight_in(cells, from_middle(cells, cell.place, place), pace, gravity, until - t)
-                found = hit_in(facets, gravity, (r, v), (number, until), here)
-                if found.wall >= 0.0:
-                    return found
-        else:
-            until = t + until_next(gravity, cells, cell, place, pace)
-        if not until < math.inf:
-            return flights.NEVER
-        t, place, pace = until, r + displacement(gravity, v, until), accelerated(gravity, v, until)
-    return flights.Hit(t, -1.0)
+        """The facet that goes on with the plane of another one at a place, or -1."""
+        first, stop = entries_at(self.grid, r)
+        normal, found, widest = self.wall(number).normal, -1.0, -near
+        for k in range(first, stop):
+            m = self.grid.entries[k]
+            other = member(self, index(m))
+            turn, within = cross(normal, other.normal), other.within(r)
+            is_flat = dot(normal, other.normal) > 0.0 and square(turn) <= _PARALLEL * _PARALLEL
+            if float(m) != number and is_flat and abs(other.phi(r)) <= _ON * self.like.room.value and within > widest:
+                found, widest = float(m), within
+        return found
 
 
 def hit_in(facets, gravity, flight, cell, here):

@@ -24,7 +24,7 @@ from .. import rotation as rotations
 from ..area_samples import AreaSample, Region, of_triangles
 from ..fields.members import Members
 from ..fields.one_wall import OneWall, one_wall
-from ..surface import UNBOUNDED, Box, Surface, side_sign
+from ..surface import LAWS, UNBOUNDED, Box, Surface, side_sign
 from .faces import faces_of
 from .facet import OVERLAP, ROOM, THIN, CornersOf, CornersOfSides, FacetNumbers, Shared, SheetSide
 from .facet_cells import MOVING_MARGIN, cells_around
@@ -38,7 +38,7 @@ from .triangles import closed, sheets
 
 _NOUNS_OF_SHEETS = ("open mesh",) * 4
 # What a group may have of its own.
-_LAWS = ("restitution", "friction", "temperature", "accommodation", "laws")
+LAWS_OF_GROUPS = tuple(name for name in LAWS if name != "rolling")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -161,7 +161,7 @@ class Mesh(Surface):
             if not isinstance(laws, Mapping):
                 raise SceneError(f"groups[{name!r}] must be a table of laws, got {laws!r:.200}")
             for key in laws:
-                checks.one_of(f"groups[{name!r}]", key, dict.fromkeys(_LAWS))
+                checks.one_of(f"groups[{name!r}]", key, dict.fromkeys(LAWS_OF_GROUPS))
         return {name: dict(laws) for name, laws in self.groups.items()}
 
     def __len__(self) -> int:
@@ -339,10 +339,8 @@ class Mesh(Surface):
         found = np.asarray(self._nearest(points, time)[3])
         return found - THIN * self._room if self.open else found
 
-    def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
-        """Gradient of that phi at points (3, N); shape (3, N)."""
-        found = self._nearest(points, time)[:3]
-        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
+    def _own_gradient(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
+        return self._nearest(points, time)[:3]
 
     def _nearest(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
         rows = self._own_rows(points, time)

@@ -1,6 +1,6 @@
 """The fields of bodies by their kind: each body at its place, with its size and its rotation or axis."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -66,9 +66,8 @@ class Spheres(Many):
     def rooms_of_balls(self) -> tuple[Any, ...]:
         if not self.is_foam():
             return self.rooms
-        laws = {one.name: getattr(self, one.name) for one in fields(self) if one.kw_only}
         rows = zip(self.centers.tolist(), self.radii.tolist(), strict=True)
-        return tuple((Sphere(radius, center, "inside", **laws),) for center, radius in rows)
+        return tuple((Sphere(radius, center, "inside", **self.common()),) for center, radius in rows)
 
     def largest_ball(self) -> float:
         return float(self.radii.min()) if self.is_foam() else super().largest_ball()

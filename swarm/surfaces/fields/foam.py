@@ -21,8 +21,25 @@ _MOST_PARTS = 1000
 class Foam(Members, Patched):
     """Cavities, in any of which is admissible; the wall of each is there where it is in no other."""
 
+    @outlined
     def field_hit(self, gravity, r, v):
-        return _leaving(self, gravity, r, v)
+        """When a flight leaves the last of the cavities that hold it, or its cell, or goes on in another cavity."""
+        first, stop = entries_at(self.grid, r)
+        nearest, slack = _nearest(self, r), ON_FOAM * total(absolute(r))
+        last, wall = -1.0, -1.0
+        for k in range(first, stop):
+            m = self.grid.entries[k]
+            cavity = member(self, index(m))
+            if cavity.distance(r) <= slack or float(m) == nearest[0]:
+                time, _found = flights.hit(gravity, cavity, r, v)
+                if time > last:
+                    last, wall = time, float(m)
+        until = until_next(gravity, self.grid, cell_of(self.grid, r), r, v)
+        if wall < 0.0 or last >= until:
+            return flights.Hit(until, -1.0)
+        if _is_in_other(self, wall, r + displacement(gravity, v, last), _INSIDE * slack):
+            return flights.Hit(last, -1.0)
+        return flights.Hit(last, wall)
 
     def other_hit(self, number, r, v, until):
         # A chord of a cavity is inside of it.
@@ -35,8 +52,13 @@ class Foam(Members, Patched):
         """The distance outside of the nearest one."""
         return _nearest(self, r)[1]
 
+    @outlined
     def foot(self, tree, r):
-        return _foot(self, r)
+        """The `SignedDistance` outside of the nearest cavity, which may be one of another cell."""
+        gap, which = nearest_body(self, r)
+        if not gap < math.inf:
+            return SignedDistance(-math.inf, Vec(1.0, 0.0, 0.0))
+        return SignedDistance(gap, member(self, index(which - 1)).gradient(r))
 
     # What is near a point is the wall of the cavity that it is deepest in.
 
@@ -72,15 +94,6 @@ def _nearest(foam, r):
 
 
 @outlined
-def _foot(foam, r):
-    """The `SignedDistance` outside of the nearest cavity, which may be one of another cell."""
-    gap, which = nearest_body(foam, r)
-    if not gap < math.inf:
-        return SignedDistance(-math.inf, Vec(1.0, 0.0, 0.0))
-    return SignedDistance(gap, member(foam, index(which - 1)).gradient(r))
-
-
-@outlined
 def _is_in_other(foam, number, r, near):
     """Whether a point is inside of another cavity than this one, by more than `near`."""
     first, stop = entries_at(foam.grid, r)
@@ -96,29 +109,8 @@ def _end(foam, r, v, until):
     """The `Hit` where a straight flight that lasts so long leaves the foam; the wall is -1 where it is free so far."""
     t = 0.0
     for _part in range(_MOST_PARTS):
-        hit = _leaving(foam, None, r + t * v, v)
+        hit = foam.field_hit(None, r + t * v, v)
         t += hit.time
         if hit.wall >= 0.0 or not t < until:
             return flights.Hit(t, hit.wall)
     return flights.Hit(t, -1.0)
-
-
-@outlined
-def _leaving(foam, gravity, r, v):
-    """When a flight leaves the last of the cavities that hold it, or its cell, or goes on in another cavity."""
-    first, stop = entries_at(foam.grid, r)
-    nearest, slack = _nearest(foam, r), ON_FOAM * total(absolute(r))
-    last, wall = -1.0, -1.0
-    for k in range(first, stop):
-        m = foam.grid.entries[k]
-        cavity = member(foam, index(m))
-        if cavity.distance(r) <= slack or float(m) == nearest[0]:
-            time, _found = flights.hit(gravity, cavity, r, v)
-            if time > last:
-                last, wall = time, float(m)
-    until = until_next(gravity, foam.grid, cell_of(foam.grid, r), r, v)
-    if wall < 0.0 or last >= until:
-        return flights.Hit(until, -1.0)
-    if _is_in_other(foam, wall, r + displacement(gravity, v, last), _INSIDE * slack):
-        return flights.Hit(last, -1.0)
-    return flights.Hit(last, wall)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 from ...motion import Placed
 from ..facets.mesh import Mesh
 from ..in_motion.moving import walls_of
-from ..surface import Surface
+from ..surface import LAWS, Surface
 from .many import Many
 from .members import alike, can_be_member, kind_of
 
@@ -106,7 +106,8 @@ def order_of(
             and len(surfaces[i].walls()) == 1
             and can_be_member(surfaces[i].walls()[0])
         ):
-            of_kind[kind_of(surfaces[i].walls()[0]), _laws(surfaces[i])].append(i)
+            laws = tuple(getattr(surfaces[i], name) for name in (*LAWS, "openings"))
+            of_kind[kind_of(surfaces[i].walls()[0]), laws].append(i)
     groups = [tuple(group) for group in of_kind.values() if len(group) > _FEW]
     grouped = {i for group in groups for i in group}
     others = [i for i in rest if i not in grouped]
@@ -127,14 +128,3 @@ def order_of(
     groups.sort(key=len)
     fields, others = (by_kind(by_kind(some, volumes), walls) for some in (fields, others))
     return Order(tuple(fields), tuple(by_kind(groups, body)), tuple(others), tuple(unions), of_balls)
-
-
-def _laws(surface: Surface) -> tuple[Any, ...]:
-    return (
-        surface.restitution,
-        surface.friction,
-        surface.temperature,
-        surface.accommodation,
-        surface.laws,
-        surface.openings,
-    )

@@ -8,7 +8,6 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ... import motion as motions
 from ...common.once import once
 from ...common.rows import balls, bodies, directions, kept, lengths, widths
 from ...errors import SceneError
@@ -242,10 +241,8 @@ class Many(Surface):
         """phi of the nearest body at points (3, N): below 0 in it, above 0 outside of all; shape (N,)."""
         return np.asarray(self._of_nearest(points, time)[3])
 
-    def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
-        """Gradient of that phi at points (3, N); shape (3, N)."""
-        found = self._of_nearest(points, time)[:3]
-        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
+    def _own_gradient(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
+        return self._of_nearest(points, time)[:3]
 
     def _of_nearest(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
         rows = self._own_rows(points, time)

@@ -120,17 +120,47 @@ class Members(Record):
         """A time during which a particle surely meets none of them, as `Smooth.reach`."""
         return rise_time(-self.far(lease.r), 0.5 * (norm(lease.v) + lease.width), 0.5 * norm(lease.a))
 
+    @outlined
     def is_in_another(self, number, r):
         """Whether a point is in any but the one with this number."""
-        return _is_in_another(self, number, r)
+        first, stop = entries_at(self.grid, r)
+        for k in range(first, stop):
+            m = self.grid.entries[k]
+            body = member(self, index(m))
+            if body.level_of(body.inner(r)) > 0.0 and float(m) != number:
+                return True
+        return False
 
+    @outlined
     def field_hit(self, gravity, r, v):
-        """The first `Hit` of a free flight, or how far it is surely free."""
-        return _first_hit(self, gravity, r, v)
+        """The first `Hit` of a free flight in its cell, or when it leaves that, free so far."""
+        grid = self.grid
+        cell = cell_of(grid, r)
+        found, (first, stop) = flights.Hit(until_next(gravity, grid, cell, r, v), -1.0), entries_of(grid, cell.number)
+        for k in range(first, stop):
+            m = grid.entries[k]
+            time, hits = flights.hit(gravity, member(self, index(m)), r, v)
+            if time < found.time:
+                found = flights.Hit(time, select(hits, float(m), -1.0))
+        return found
 
+    @outlined
     def other_hit(self, number, r, v, until):
         """The first `Hit` of a straight flight that lasts so long with any but this one; -1: with any of them."""
-        return _other_hit(self, number, r, v, until)
+        grid, t, place = self.grid, 0.0, r
+        for _cell in range(_MOST_CELLS):
+            cell = cell_of(grid, place)
+            found = flights.Hit(t + self.until_out(cell, None, place, v), -1.0)
+            first, stop = entries_of(grid, cell.number)
+            for k in range(first, stop):
+                m = float(grid.entries[k])
+                time, _hits = member(self, index(grid.entries[k])).first_hit(r, v)
+                if time < found.time and m != number:
+                    found = flights.Hit(time, m)
+            if found.wall >= 0.0 or not found.time < until:
+                return found
+            t, place = found.time, r + found.time * v
+        return flights.Hit(t, -1.0)
 
     def keeps(self, number, r):
         """Whether a step along one of them that ends at a place on it ends where that is; of any other it says so."""
@@ -181,13 +211,35 @@ class Members(Record):
         """When a straight flight may meet another one."""
         return until_next(None, self.grid, cell_of(self.grid, r), r, v)
 
+    @outlined
     def deepest_in_cell(self, r):
         """The largest distance into any of them."""
-        return _deepest(self, r)
+        most = -math.inf
+        first, stop = entries_at(self.grid, r)
+        for k in range(first, stop):
+            most = max(most, member(self, index(self.grid.entries[k])).distance(r))
+        return most
 
+    @outlined
     def foot(self, tree, r):
-        """The `SignedDistance` of a point on all of them as one wall; `tree` is that of a mesh."""
-        return _foot(self, r)
+        """The `SignedDistance` of a point on all of them as one wall; `tree` is that of a mesh.
+
+        The gap of a point in several bodies is the root of the sum of the squares of its depths.
+        """
+        best, which = nearest_body(self, r)
+        if not best < math.inf:
+            return SignedDistance(-math.inf, Vec(1.0, 0.0, 0.0))
+        if best >= 0.0:
+            return SignedDistance(-best, -1.0 * member(self, index(which - 1)).gradient(r))
+        first, stop = entries_at(self.grid, r)
+        squares, sums = 0.0, Vec(0.0, 0.0, 0.0)
+        for k in range(first, stop):
+            body = member(self, index(self.grid.entries[k]))
+            depth = -body.phi(r)
+            if depth > 0.0:
+                squares, sums = squares + depth * depth, sums - depth * body.gradient(r)
+        gap = math.sqrt(squares)
+        return SignedDistance(gap, sums * (1.0 / gap))
 
 
 class Few(Members):
@@ -313,61 +365,6 @@ def _written(like: Any) -> list[float]:
     return [number for part in like for number in _written(part)] if isinstance(like, tuple) else [float(like)]
 
 
-# --- Outlined, of the cell of a point --------------------------------------------------------------------
-
-
-@outlined
-def _is_in_another(members, number, r):
-    first, stop = entries_at(members.grid, r)
-    for k in range(first, stop):
-        m = members.grid.entries[k]
-        body = member(members, index(m))
-        if body.level_of(body.inner(r)) > 0.0 and float(m) != number:
-            return True
-    return False
-
-
-@outlined
-def _deepest(members, r):
-    most = -math.inf
-    first, stop = entries_at(members.grid, r)
-    for k in range(first, stop):
-        most = max(most, member(members, index(members.grid.entries[k])).distance(r))
-    return most
-
-
-@outlined
-def _first_hit(members, gravity, r, v):
-    """The first hit in the cell of a particle, or when it is in another one."""
-    grid = members.grid
-    cell = cell_of(grid, r)
-    found, (first, stop) = flights.Hit(until_next(gravity, grid, cell, r, v), -1.0), entries_of(grid, cell.number)
-    for k in range(first, stop):
-        m = grid.entries[k]
-        time, hits = flights.hit(gravity, member(members, index(m)), r, v)
-        if time < found.time:
-            found = flights.Hit(time, select(hits, float(m), -1.0))
-    return found
-
-
-@outlined
-def _other_hit(members, number, r, v, until):
-    grid, t, place = members.grid, 0.0, r
-    for _cell in range(_MOST_CELLS):
-        cell = cell_of(grid, place)
-        found = flights.Hit(t + members.until_out(cell, None, place, v), -1.0)
-        first, stop = entries_of(grid, cell.number)
-        for k in range(first, stop):
-            m = float(grid.entries[k])
-            time, _hits = member(members, index(grid.entries[k])).first_hit(r, v)
-            if time < found.time and m != number:
-                found = flights.Hit(time, m)
-        if found.wall >= 0.0 or not found.time < until:
-            return found
-        t, place = found.time, r + found.time * v
-    return flights.Hit(t, -1.0)
-
-
 # --- Which is near ---------------------------------------------------------------------------------------
 
 
@@ -397,25 +394,6 @@ def nearest_body(members, r):
             best, which = phi, m + 1
         shell += 1.0
     return best, which
-
-
-@outlined
-def _foot(members, r):
-    """Of a point in several bodies the root of the sum of the squares of its depths."""
-    best, which = nearest_body(members, r)
-    if not best < math.inf:
-        return SignedDistance(-math.inf, Vec(1.0, 0.0, 0.0))
-    if best >= 0.0:
-        return SignedDistance(-best, -1.0 * member(members, index(which - 1)).gradient(r))
-    first, stop = entries_at(members.grid, r)
-    squares, sums = 0.0, Vec(0.0, 0.0, 0.0)
-    for k in range(first, stop):
-        body = member(members, index(members.grid.entries[k]))
-        depth = -body.phi(r)
-        if depth > 0.0:
-            squares, sums = squares + depth * depth, sums - depth * body.gradient(r)
-    gap = math.sqrt(squares)
-    return SignedDistance(gap, sums * (1.0 / gap))
 
 
 @outlined

@@ -46,8 +46,9 @@ class OneWall(Smooth):
         foot = _foot(self, r)
         return foot.gap / norm(foot.normal)
 
+    @outlined
     def hessian(self, r):
-        return _bend(self, r)
+        return half_hessian(self, r, SPACING * total(absolute(r)) + EPSILON)
 
     def step_bend(self, r0, d):
         # Of the end that is deeper: between the two there may be an edge.
@@ -64,8 +65,12 @@ class OneWall(Smooth):
     def falling_hit(self, r, v, pull):
         return _first_hit(self.members, Gravity(pull.x, pull.y, pull.z), r, v)
 
+    @outlined
     def safe_time(self, r, v, pull):
-        return _safe_time(self, r, v, pull)
+        """When a fall may meet a member, or is in another cell; 0 where it is in contact."""
+        if self.phi(r) > 0.0:
+            return 0.0
+        return self.members.field_hit(Gravity(pull.x, pull.y, pull.z), r, v).time
 
     def moving_step(self, seen, longest):
         # No farther than the nearest place
@@ -79,8 +84,22 @@ class OneWall(Smooth):
     def clearance(self, r):
         return max(-self.distance(r), 0.0)
 
+    @outlined
     def discrete_gradient(self, r0, r1):
-        return _discrete_gradient(self, r0, r1)
+        """Gonzalez's, with the mean of the gradients at both ends by how deep they are, which corners do not make jump.
+
+        Where these turn by more than a wall does in a step, as at an edge towards the points, it is that of the start.
+        """
+        one, other = _foot(self, r0), _foot(self, r1)
+        a, b = max(one.gap, 0.0), max(other.gap, 0.0)
+        if a + b == 0.0:
+            a, b = (1.0, 0.0) if one.gap > other.gap else (0.0, 1.0)
+        if a > 0.0:
+            cosine = dot(one.normal, other.normal) / (norm(one.normal) * norm(other.normal))
+            b *= min(max((cosine - _EDGE) / (_SMOOTH - _EDGE), 0.0), 1.0)
+        g, d = (a / (a + b)) * one.normal + (b / (a + b)) * other.normal, r1 - r0
+        d2, rest = square(d), (other.gap - one.gap) - dot(g, d)
+        return g + (rest / d2) * d if d2 > 0.0 else g
 
     def push(self, r0, p, kappa):
         # Without a push there is nothing to solve.
@@ -108,33 +127,10 @@ def _foot(whole, r):
     return whole.members.foot(whole.tree, r)
 
 
-@outlined
-def _discrete_gradient(whole, r0, r1):
-    """Gonzalez's, with the mean of the gradients at both ends by how deep they are, which corners do not make jump.
-
-    Where these turn by more than a wall does in a step, as at an edge towards the points, it is that of the start.
-    """
-    one, other = _foot(whole, r0), _foot(whole, r1)
-    a, b = max(one.gap, 0.0), max(other.gap, 0.0)
-    if a + b == 0.0:
-        a, b = (1.0, 0.0) if one.gap > other.gap else (0.0, 1.0)
-    if a > 0.0:
-        cosine = dot(one.normal, other.normal) / (norm(one.normal) * norm(other.normal))
-        b *= min(max((cosine - _EDGE) / (_SMOOTH - _EDGE), 0.0), 1.0)
-    g, d = (a / (a + b)) * one.normal + (b / (a + b)) * other.normal, r1 - r0
-    d2, rest = square(d), (other.gap - one.gap) - dot(g, d)
-    return g + (rest / d2) * d if d2 > 0.0 else g
-
-
 def _free_rise(whole, r0, r1):
     """`rise` of a step that is not pushed."""
     g = whole.discrete_gradient(r0, r1)
     return dot(g, r1 - r0), -dot(g, whole.gradient(r1))
-
-
-@outlined
-def _bend(whole, r):
-    return half_hessian(whole, r, SPACING * total(absolute(r)) + EPSILON)
 
 
 @outlined
@@ -148,11 +144,3 @@ def _first_hit(members, gravity, r, v):
             return t, True
         place, pace = r + displacement(gravity, v, t), accelerated(gravity, v, t)
     return t, False
-
-
-@outlined
-def _safe_time(whole, r, v, pull):
-    """When a fall may meet a member, or is in another cell; 0 where it is in contact."""
-    if whole.phi(r) > 0.0:
-        return 0.0
-    return whole.members.field_hit(Gravity(pull.x, pull.y, pull.z), r, v).time

@@ -15,13 +15,14 @@ from ...kernel.record import Record
 from ...kernel.vector import ZERO, either
 from ..balls.joined_rooms import JoinedRooms
 from ..presence.joined import with_rooms
+from ..surface import LAWS
 from ..time_of_impact import flights
 from ..walls import Walls, all_walls
 from .members import SignedDistance
 from .one_wall import OneWall
 
 # What all parts of a union that is one wall have in common, besides their openings.
-IN_COMMON = "restitution", "friction", "rolling", "temperature", "accommodation", "laws", "motion", "present"
+IN_COMMON = *LAWS, "motion", "present"
 
 
 class RoomsTogether(Record):
@@ -29,13 +30,32 @@ class RoomsTogether(Record):
 
     walls: Walls
 
+    @outlined
     def foot(self, tree, r):
         """The `SignedDistance` of a point."""
-        return _foot(self.walls, r)
+        gap, normal = math.inf, ZERO
+        for rooms in self.walls.joined():
+            for room in rooms:
+                deepest, steep, squares, sums = -math.inf, ZERO, 0.0, ZERO
+                for _number, wall, _gentle in room:
+                    q = wall.inner(r)
+                    one, (slope, _bend) = wall.gap_of(q), wall.gap_slope(q, q)
+                    n = slope * wall.inner_gradient(r)
+                    deeper, depth = one > deepest, select(one > 0.0, one, 0.0)
+                    deepest, steep = select(deeper, one, deepest), either(deeper, n, steep)
+                    squares, sums = squares + depth * depth, either(one > 0.0, sums + depth * n, sums)
+                away = math.sqrt(squares)
+                is_out = away > 0.0
+                deepest = select(is_out, away, deepest)
+                steep = either(is_out, sums * (1.0 / select(is_out, away, 1.0)), steep)
+                nearer = deepest < gap
+                gap, normal = select(nearer, deepest, gap), either(nearer, steep, normal)
+        return SignedDistance(gap, normal)
 
+    @outlined
     def field_hit(self, gravity, r, v):
         """The `Hit` where a flight leaves the last of the rooms that hold it, or goes on in another one."""
-        return _leaving(self.walls, gravity, r, v)
+        return flights.first_hit(self.walls, gravity, r, v)
 
     def loosened(self, reach):
         """The same: rooms have no tables."""
@@ -61,30 +81,3 @@ def soft_rooms(union: Any) -> SoftRooms:
     """A union of several rooms as one wall, with what all of its parts have in common."""
     one = union.rooms[0][0]
     return SoftRooms(rooms_of=union.rooms, **{name: getattr(one, name) for name in IN_COMMON})
-
-
-@outlined
-def _foot(walls, r):
-    gap, normal = math.inf, ZERO
-    for rooms in walls.joined():
-        for room in rooms:
-            deepest, steep, squares, sums = -math.inf, ZERO, 0.0, ZERO
-            for _number, wall, _gentle in room:
-                q = wall.inner(r)
-                one, (slope, _bend) = wall.gap_of(q), wall.gap_slope(q, q)
-                n = slope * wall.inner_gradient(r)
-                deeper, depth = one > deepest, select(one > 0.0, one, 0.0)
-                deepest, steep = select(deeper, one, deepest), either(deeper, n, steep)
-                squares, sums = squares + depth * depth, either(one > 0.0, sums + depth * n, sums)
-            away = math.sqrt(squares)
-            is_out = away > 0.0
-            deepest = select(is_out, away, deepest)
-            steep = either(is_out, sums * (1.0 / select(is_out, away, 1.0)), steep)
-            nearer = deepest < gap
-            gap, normal = select(nearer, deepest, gap), either(nearer, steep, normal)
-    return SignedDistance(gap, normal)
-
-
-@outlined
-def _leaving(walls, gravity, r, v):
-    return flights.first_hit(walls, gravity, r, v)

@@ -28,11 +28,11 @@ _SMALLEST, _LARGEST = -40, 24
 # The box is found by cutting layers off its sides, each this part of it, of so many cells along an edge; of a cube in
 # which a cavity is looked for, so many.
 _LAYERS, _LAYER_CELLS, _CUBES = tuple(0.5**k for k in range(2, 11)), 24, 8
-# Of third derivatives: an entry of H, an axis along which it is derived, and in how many orders that is.
+# The third derivatives: an entry of H, the axis by which it is differentiated, and in how many orders each occurs.
 _THIRDS = (
     (0, 0, 1), (1, 1, 1), (2, 2, 1), (0, 1, 3), (0, 2, 3), (1, 0, 3), (1, 2, 3), (2, 0, 3), (2, 1, 3), (3, 2, 6)
 )  # fmt: skip
-# More than the round-off of a sum of their squares.
+# A factor above the round-off of the sum of their squares.
 _UPWARDS = 1.0 + 1e-12
 # Room around the box that was found, relative to it.
 _ROOM = 1e-3
@@ -75,7 +75,7 @@ class Derived(NamedTuple):
     axes: tuple[Any, ...]
     functions: tuple[Any, ...]
     along: Any  # the function of the coefficients of a polynomial along a straight flight, or None
-    along_fall: Any  # that along a fall of one of degree 3 or 4, or None
+    along_fall: Any  # the same along a fall, for degrees 3 and 4; else None
 
     def with_values(self, values: tuple[float, ...]) -> "Derived":
         """The expressions with numbers in place of the parameters."""
@@ -129,7 +129,7 @@ class Derived(NamedTuple):
                 "bounds must be given: none were found that hold all of phi <= 0; or give curvature, a number that the "
                 "second derivative of phi in any direction never exceeds"
             )
-        # Bounds of second derivatives may not show it.
+        # The bounds of second derivatives may hide a corner or a pole.
         check_smooth(self.pieces, self.phi, self.axes, side_sign(form.side), form.domain(), form.reach())
 
     def _varies(self) -> bool:
@@ -209,7 +209,7 @@ def _function(name: str, rows: Sequence[Any]) -> Any:
 
 
 def _along(phi: Any) -> Any:
-    """A function (p, x, y, z, u, v, w) of the coefficients of phi along a flight, None if it is no such polynomial."""
+    """A function (p, x, y, z, u, v, w) of the coefficients of phi along a flight, None above degree 4."""
     writer = _DerivativeWriter()
     found = LevelSeries(writer, falls=False).of(phi)
     if found is None:
@@ -221,7 +221,7 @@ def _along(phi: Any) -> Any:
 
 
 def _along_fall(phi: Any) -> Any:
-    """A function (p, x, y, z, u, v, w, a, b, c) of the same along a fall, (a, b, c) half its acceleration."""
+    """A function (p, x, y, z, u, v, w, a, b, c) of the same along a fall; (a, b, c) is half its acceleration."""
     writer = _DerivativeWriter()
     found = LevelSeries(writer, falls=True).of(phi) or []
     function = _made("along_fall", (*COORDINATES, *VELOCITY, *HALF_PULL), writer, found)
@@ -230,7 +230,7 @@ def _along_fall(phi: Any) -> Any:
 
 
 def _made(name: str, arguments: Sequence[str], writer: "_DerivativeWriter", results: list[str]) -> Any:
-    """The function of what is written."""
+    """The function with the lines that a writer has."""
     lines = [f"def {name}(p, {', '.join(arguments)}):", *writer.lines, f"return {', '.join(results)}"]
     scope: dict[str, Any] = {"np": np, **_COMPUTED, "__name__": __name__}
     text = "\n    ".join(lines)
@@ -240,7 +240,7 @@ def _made(name: str, arguments: Sequence[str], writer: "_DerivativeWriter", resu
     return scope[name]
 
 
-# What computes the functions of a formula: of those with one value by their names, and all.
+# The functions that compute those of a formula: of those with one value by SymPy's names, and all of them.
 _OF_ONE = {"exp": "exponential", "log": "logarithm", "tanh": "hyperbolic_tangent"}
 _COMPUTED = {
     "sine_and_cosine": sine_and_cosine, "exponential": exponential, "logarithm": logarithm, "hyperbolic": hyperbolic,

@@ -22,7 +22,7 @@ _ONE = np.float64(1.0)
 class Bend(NamedTuple):
     """Bounds of side H, H = grad grad phi/2: of its eigenvalues, and of its entries.
 
-    `third` is one of the third derivative of phi in any direction; infinite if it is not known.
+    `third` bounds the third derivative of phi in any direction; it is infinite where no bound is known.
     """
 
     least: float
@@ -72,7 +72,7 @@ def _between(low, high, x, v):
 
 
 class _Face(Majorant):
-    """How far within a face of a box a fall is, c + 2 b t + a2 t^2 below 0 beyond it, and when it comes to the face."""
+    """How far a fall is from a face of a box, c + 2 b t + a2 t^2, below 0 beyond it; and when it comes to it."""
 
     c: float
     b: float
@@ -83,7 +83,7 @@ class _Face(Majorant):
 def _face(low, high, x, v, pull):
     """The face beyond which a coordinate is, or any if it is beyond none."""
     below = x - low < high - x
-    # Numbers of NumPy: in plain Python no other quotient by 0 is infinite.
+    # Floats of NumPy: in plain Python only their quotients by 0 are infinite.
     sign = select(below, _ONE, -_ONE)
     c, b, a2 = select(below, x - low, high - x), 0.5 * sign * v, 0.5 * sign * pull
     return _Face(c, b, a2, select(c < 0.0, rise_time(c, b, a2), 0.0))
@@ -108,9 +108,8 @@ class OwnNumbers(contract.Smooth):
     bends: Bend
     low: Vec
     high: Vec
-    # 1 if there is surely no wall outside the box, and how far outside of it the bend is known
-    closed: float
-    margin: float
+    closed: float  # 1 where there is surely no wall outside the box, else 0
+    margin: float  # how far outside of the box the bounds of the bend hold
     parameters: Any
 
     def hessian(self, r):
@@ -135,8 +134,8 @@ class OwnNumbers(contract.Smooth):
         d = r1 - r0
         if largest(d) > _SHORT * self.size:
             return self.phi(r1) - self.phi(r0)
-        # Of close points the difference of phi has few digits: the integral of grad phi.d, by Gauss's rule of three
-        # points
+        # The difference of phi has few digits at close points, and the integral of grad phi.d all of them: Gauss's rule
+        # of three points
         m, e = 0.5 * (r0 + r1), _NODE * d
         outer = self.gradient(m - e) + self.gradient(m + e)
         return dot(5.0 * outer + 8.0 * self.gradient(m), d) / 18.0
@@ -181,7 +180,7 @@ class OwnNumbers(contract.Smooth):
         return first_found(self.straight(r, v))
 
     def straight(self, r, v):
-        """A straight flight as looks at it take it."""
+        """The `Straight` of a flight."""
         bend, speed2 = self.bends, square(v)
         start, end = self.span(r, v)
         # least <= v.side H v <= most
@@ -204,7 +203,7 @@ class OwnNumbers(contract.Smooth):
 
 
 class SmoothCavity(OwnNumbers):
-    """A formula that is no polynomial, or one of a higher degree: its flights are looked at in lanes. A cavity."""
+    """The cavity of a formula that is no polynomial of degree 4 or less: lanes look at its flights."""
 
     in_steps = True
     looked_at = True
@@ -222,7 +221,7 @@ class SmoothCavity(OwnNumbers):
 
 
 class SmoothSolid(SmoothCavity):
-    """The same of a solid."""
+    """The solid of such a formula."""
 
     falls = FallToBox
 

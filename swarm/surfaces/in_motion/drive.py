@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import motion as motions
 from ...kernel.arrays import index
-from ...kernel.elementary import nearly_sine_and_versine, sine_and_versine
+from ...kernel.elementary import sine_and_versine
 from ...kernel.jit import Array, select
 from ...kernel.limits import EPSILON
 from ...kernel.record import Record
@@ -263,10 +263,6 @@ class Drive(Record):
     def waves_at(self, remaining):
         """The `Wave` of each angle when so much of the frame is left [s]."""
         return tuple(wave_of(rate * -remaining) for rate in self.rates())
-
-    def nearly_waves_at(self, remaining):
-        """The same to some 1e-7."""
-        return tuple(Wave(*nearly_sine_and_versine(rate * -remaining)) for rate in self.rates())
 
     def on_piece(self, piece):
         """The motion at one instant, at which a path is on this piece."""

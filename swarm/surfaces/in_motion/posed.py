@@ -10,7 +10,7 @@ from typing import Any
 
 from ...kernel.elementary import sine_and_versine
 from ...kernel.jit import select
-from ...kernel.vector import Vec, absolute, cross, dot, norm, times, total
+from ...kernel.vector import ZERO, Vec, absolute, cross, dot, norm, times, total
 from ..frames import Framed
 from ..time_of_impact import safe
 from ..time_of_impact.rising import flight_of
@@ -50,21 +50,19 @@ class Posed(Framed):
 
     def own_velocity(self, r, v):
         """The velocity of a particle in the frame of the wall."""
-        return self.pose.back(v - self._velocity(r))
+        w = v - self.pose.velocity
+        return w if self.pose.turn is None else self.pose.back(w) - cross(self.drive.spin, self.pose.back(self.arm(r)))
 
     def own_pull(self, r, v, pull):
         """The acceleration of a free particle in the frame of the wall."""
-        felt = pull - self.pose.acceleration
+        at_rest = pull is ZERO and self.pose.acceleration is ZERO
+        felt = ZERO if at_rest else pull - self.pose.acceleration
         if self.pose.turn is None:
             return felt
-        spin, w = self.drive.spin, v - self._velocity(r)
-        # The accelerations of a rotating frame, -2 w x v - w x (w x a)
-        return self.pose.back(felt + -1.0 * (2.0 * cross(spin, w) + cross(spin, cross(spin, self.arm(r)))))
-
-    def _velocity(self, r):
-        """The velocity of the frame at a point."""
-        moved = self.pose.velocity
-        return moved if self.pose.turn is None else moved + cross(self.drive.spin, self.arm(r))
+        # The accelerations of a rotating frame, -2 w x v - w x (w x a), where it turns about the same axis
+        spin, arm = self.drive.spin, self.pose.back(self.arm(r))
+        turns = cross(2.0 * self.own_velocity(r, v) + cross(spin, arm), spin)
+        return turns if at_rest else self.pose.back(felt) + turns
 
     def arm(self, r):
         """From the centre of the rotation to a point."""

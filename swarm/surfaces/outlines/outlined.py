@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ... import motion as motions
 from ...common.checks import Vector
 from ...kernel.grid import one_cell
 from ...kernel.limits import ON_OUTLINE
@@ -116,10 +115,8 @@ class Outlined(Many):
         """The signed distance of points (3, N): below 0 inside, 0 on the surface, above 0 outside; shape (N,)."""
         return self._at(points, time)[0]
 
-    def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
-        """Gradient of phi at points (3, N); shape (3, N). At a corner it is that of one of its sides."""
-        found = self._at(points, time)[1]
-        return found if self.motion is None else motions.pose(self.motion, time).turned(found)
+    def _own_gradient(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
+        return self._at(points, time)[1]
 
     def _at(self, points: ArrayLike, time: float) -> tuple[Floats, Floats]:
         rows = np.array(self._own_rows(points, time))

@@ -5,7 +5,7 @@ from typing import Any
 
 from ...kernel.jit import outlined, select
 from ...kernel.vector import Vec, either, norm, square, times
-from .. import contract
+from ..balls.at_radius import AtRadius
 from ..balls.tube import Tube
 from ..rotation import Rotated
 from ..time_of_impact.course import ball_rise_time
@@ -16,25 +16,18 @@ from .sides import Side
 _LEAST = 1e-12
 
 
-class RoundSide(contract.Smooth):
+class RoundSide(AtRadius):
     """All that is within the radius of a ball from one side; phi is the distance outside of what is admissible."""
 
     wall: Side
     radius: float
 
     side = 1.0
-    holds_balls = True
-
-    def grown(self, radius):
-        return self._replace(radius=radius)
 
     # --- The distance ---
 
     def phi(self, r):
         return self.wall.distance(r) + self.radius
-
-    def distance(self, r):
-        return self.phi(r)
 
     def gradient(self, r):
         # Towards the nearest point of the side, or, behind it, away from that
@@ -48,14 +41,6 @@ class RoundSide(contract.Smooth):
         n = either(within, out, to_end)
         length = norm(n)
         return n * (1.0 / select(length > 0.0, length, 1.0))
-
-    unit_normal = gradient
-
-    def far(self, r):
-        return -self.phi(r)
-
-    def out_of(self, r):
-        return -self.phi(r)
 
     def may_reach(self, low, high):
         wall = self.wall
@@ -114,49 +99,41 @@ class RoundSide(contract.Smooth):
             first = select(time < first, time, first)
         return first, True
 
+    @outlined
     def falling_hit(self, r, v, pull):
-        return _first_fall(self, r, v, pull)
+        """When a fall hits the side: the parallel curve or a circle."""
+        fits, parallel = self.parallel()
+        first, found = math.inf, True
+        if fits:
+            first, found = parallel.falling_hit(r, v, pull)
+        if self.has_ends():
+            for circle in self.ends():
+                time, here = circle.falling_hit(r, v, pull)
+                if time < first:
+                    first, found = time, here
+        return first, found
 
     def safe_time(self, r, v, pull):
         return self.falling_hit(r, v, pull)[0]
 
+    @outlined
     def moving_step(self, seen, longest):
-        return _moving_step(self, seen, longest)
-
-
-@outlined
-def _moving_step(side, seen, longest):
-    """The `LevelStep` of the parallel curve and both circles."""
-    fits, parallel = side.parallel()
-    found = LevelStep(0.0, 0.0, longest)
-    if fits:
-        found = parallel.moving_step(seen, longest)
-    if side.has_ends():
-        for circle in side.ends():
-            step = circle.moving_step(seen, found.time)
-            is_past = (step.level > 0.0) & (step.half > 0.0)
-            level, half = select(is_past, step.level, found.level), select(is_past, step.half, found.half)
-            found = LevelStep(level, half, select(step.time < found.time, step.time, found.time))
-    return found
+        """The `LevelStep` of the parallel curve and both circles."""
+        fits, parallel = self.parallel()
+        found = LevelStep(0.0, 0.0, longest)
+        if fits:
+            found = parallel.moving_step(seen, longest)
+        if self.has_ends():
+            for circle in self.ends():
+                step = circle.moving_step(seen, found.time)
+                is_past = (step.level > 0.0) & (step.half > 0.0)
+                level, half = select(is_past, step.level, found.level), select(is_past, step.half, found.half)
+                found = LevelStep(level, half, select(step.time < found.time, step.time, found.time))
+        return found
 
 
 def _whole(part):
     return select(part > 0.25, 1.0, 0.0)
-
-
-@outlined
-def _first_fall(side, r, v, pull):
-    """When a fall hits a side: the parallel curve or a circle."""
-    fits, parallel = side.parallel()
-    first, found = math.inf, True
-    if fits:
-        first, found = parallel.falling_hit(r, v, pull)
-    if side.has_ends():
-        for circle in side.ends():
-            time, here = circle.falling_hit(r, v, pull)
-            if time < first:
-                first, found = time, here
-    return first, found
 
 
 def round_side(wall: Any) -> Any:

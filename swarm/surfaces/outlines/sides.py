@@ -67,8 +67,43 @@ class Side(Unturned):
         hits = rises & (time >= 0.0) & self.is_within(d + time * v, self.slack)
         return select(hits, time, math.inf), True
 
+    @outlined
     def falling_hit(self, r, v, pull):
-        return _first_fall(self, r, v, pull)
+        """When a fall hits the side: the first time at which its level rises through 0 within the side."""
+        begin, end = _near(self, r, v, pull)
+        if not begin <= end:
+            return math.inf, True
+        level = self.level_of_fall(r, v, pull)
+        if level.window == math.inf:
+            # A plane: the level is a parabola, which rises once at most.
+            comes = (level.c <= 0.0) | ((level.b < 0.0) & (level.b * level.b >= level.a2 * level.c) & (level.a2 > 0.0))
+            t = select(comes, rise_time(level.c, level.b, level.a2), math.inf)
+            return select(
+                self.is_within(r + t * (v + 0.5 * t * pull) - self.body.center, self.slack), t, math.inf
+            ), True
+        if begin > 0.0:
+            level = level.moved(begin)
+        t, sign = begin, select(level.c > 0.0, -1.0, 1.0)
+        for _crossing in range(_CROSSINGS):
+            turned = Quartic(
+                sign * level.c, sign * level.b, sign * level.a2, sign * level.a3, sign * level.a4, level.window
+            )
+            fall = Fall(turned, close(turned.window), False)
+            step, last = fall.first_step()
+            for _step in range(fall.most):
+                if not under_way(step, last) or t + step > end:
+                    break
+                step, last = fall.next_step(step, last)
+            t += step
+            if not t <= end:
+                return math.inf, True
+            level = level.moved(step)
+            if not under_way(step, last):
+                if sign > 0.0 and self.is_within(r + t * (v + 0.5 * t * pull) - self.body.center, self.slack):
+                    return t, True
+                level = Quartic(0.0, level.b, level.a2, level.a3, level.a4, level.window)
+                sign = -sign
+        return t, False
 
     def level_of_fall(self, r, v, pull):
         """The level of the quadric along a fall."""
@@ -87,8 +122,12 @@ class Side(Unturned):
         start, end = dot(t, body.center), dot(u, body.center + self.end)
         return PlaneNumbers(t, start - self.slack), PlaneNumbers(-1.0 * u, -end - self.slack)
 
+    @outlined
     def moving_step(self, seen, longest):
-        return _moving_step(self, seen, longest)
+        body = self.body
+        is_behind = body.phi(seen.r) > self.slack
+        whole = body._replace(side=select(is_behind, -1.0, 1.0))
+        return patch_step(whole, is_behind, self.edges(), seen, longest)
 
     # --- The distance from the side ---
 
@@ -152,14 +191,32 @@ class Side(Unturned):
 class Sides(Members, Patched):
     """The sides of an outline: a field with walls for bodies, as far as they go."""
 
+    @outlined
     def is_in_another(self, number, r):
-        return _is_beyond(self, number, r)
+        """Whether a point is outside of the outline, and nearest to another side."""
+        outside, which = _nearest(self, r)
+        return outside > 0.0 and which != number
 
     def deepest_in_cell(self, r):
         return _nearest(self, r)[0]
 
+    @outlined
     def foot(self, tree, r):
-        return _foot(self, r)
+        """Of a point beyond the outline and a lid the root of the sum of the squares of both distances."""
+        least, gap, which = math.inf, -math.inf, 0
+        lid, normal = -math.inf, Vec(0.0, 0.0, 0.0)
+        for m in range(self.table.shape[0]):
+            side = member(self, index(m))
+            signed, away, _within = _beside(side, r)
+            if _is_lid(side):
+                if signed > lid:
+                    lid, normal = signed, _out_of(side, r)
+            elif away < least:
+                least, gap, which = away, signed, m
+        if lid > 0.0 and gap > 0.0:
+            both = math.sqrt(lid * lid + gap * gap)
+            return SignedDistance(both, (lid / both) * normal + (gap / both) * _out_of(member(self, index(which)), r))
+        return SignedDistance(lid, normal) if lid > gap else SignedDistance(gap, _out_of(member(self, index(which)), r))
 
     def is_there(self, number, r, near):
         """Whether a side reaches to a place on its wall, or nearer to it than that."""
@@ -192,51 +249,6 @@ class FewSides(Sides):
 
     def in_cells(self):
         return Sides(*self)
-
-
-@outlined
-def _moving_step(side, seen, longest):
-    body = side.body
-    is_behind = body.phi(seen.r) > side.slack
-    whole = body._replace(side=select(is_behind, -1.0, 1.0))
-    return patch_step(whole, is_behind, side.edges(), seen, longest)
-
-
-@outlined
-def _first_fall(side, r, v, pull):
-    """When a fall hits a side: of all times at which its level rises through 0 the first within the side."""
-    begin, end = _near(side, r, v, pull)
-    if not begin <= end:
-        return math.inf, True
-    level = side.level_of_fall(r, v, pull)
-    if level.window == math.inf:
-        # A plane: the level is a parabola, which rises once at most.
-        comes = (level.c <= 0.0) | ((level.b < 0.0) & (level.b * level.b >= level.a2 * level.c) & (level.a2 > 0.0))
-        t = select(comes, rise_time(level.c, level.b, level.a2), math.inf)
-        return select(side.is_within(r + t * (v + 0.5 * t * pull) - side.body.center, side.slack), t, math.inf), True
-    if begin > 0.0:
-        level = level.moved(begin)
-    t, sign = begin, select(level.c > 0.0, -1.0, 1.0)
-    for _crossing in range(_CROSSINGS):
-        turned = Quartic(
-            sign * level.c, sign * level.b, sign * level.a2, sign * level.a3, sign * level.a4, level.window
-        )
-        fall = Fall(turned, close(turned.window), False)
-        step, last = fall.first_step()
-        for _step in range(fall.most):
-            if not under_way(step, last) or t + step > end:
-                break
-            step, last = fall.next_step(step, last)
-        t += step
-        if not t <= end:
-            return math.inf, True
-        level = level.moved(step)
-        if not under_way(step, last):
-            if sign > 0.0 and side.is_within(r + t * (v + 0.5 * t * pull) - side.body.center, side.slack):
-                return t, True
-            level = Quartic(0.0, level.b, level.a2, level.a3, level.a4, level.window)
-            sign = -sign
-    return t, False
 
 
 def _near(side, r, v, pull):
@@ -282,32 +294,6 @@ def _nearest(sides, r):
 def _beside(side, r):
     """`beside` of a side, which may be turned."""
     return side.body.beside(side.place_in(r)) if isinstance(side, Rotated) else side.beside(r)
-
-
-@outlined
-def _is_beyond(sides, number, r):
-    """Whether a point is outside of the outline, and nearest to another side."""
-    outside, which = _nearest(sides, r)
-    return outside > 0.0 and which != number
-
-
-@outlined
-def _foot(sides, r):
-    """Of a point beyond the outline and a lid the root of the sum of the squares of both distances."""
-    least, gap, which = math.inf, -math.inf, 0
-    lid, normal = -math.inf, Vec(0.0, 0.0, 0.0)
-    for m in range(sides.table.shape[0]):
-        side = member(sides, index(m))
-        signed, away, _within = _beside(side, r)
-        if _is_lid(side):
-            if signed > lid:
-                lid, normal = signed, _out_of(side, r)
-        elif away < least:
-            least, gap, which = away, signed, m
-    if lid > 0.0 and gap > 0.0:
-        both = math.sqrt(lid * lid + gap * gap)
-        return SignedDistance(both, (lid / both) * normal + (gap / both) * _out_of(member(sides, index(which)), r))
-    return SignedDistance(lid, normal) if lid > gap else SignedDistance(gap, _out_of(member(sides, index(which)), r))
 
 
 def _is_lid(side):

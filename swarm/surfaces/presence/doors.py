@@ -10,9 +10,10 @@ import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from ...common import checks
+from ...common.validated import Flag, Validated
 from ...errors import SceneError
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
@@ -25,34 +26,6 @@ _AWAY = -1e150
 
 # Pairs (t0, t1) [s], from t0 on and before t1; None: always.
 Spans = tuple[tuple[float, float], ...] | None
-
-
-@dataclass(frozen=True)
-class Opening:
-    """A volume in which a wall is not there between some times; `openings` of a surface hold them.
-
-    Args:
-        surface: the volume, a surface without openings, laws and motion.
-        times: pairs (t0, t1) [s] that ascend, from 0 s on: it is open from t0 on and shut again from t1 on, which is
-            infinite in the last pair if it stays open. None: it is always open, as a surface is by itself.
-        between: True: only walls between rooms of a `Union` are open in it, so that a door may reach the floor.
-
-    Raises:
-        SceneError: the times are no such pairs.
-
-    >>> import swarm
-    >>> valve = swarm.Opening(swarm.Sphere(0.1, center=(0.0, 0.0, 0.5)), times=[(1.0, 2.5)])
-    >>> swarm.Sphere(0.5, openings=[valve]).openings[0].times
-    ((1.0, 2.5),)
-    """
-
-    surface: Any
-    times: Any = None
-    between: bool = False
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "between", checks.flag("between", self.between))
-        object.__setattr__(self, "times", checked_spans("times", self.times))
 
 
 def checked_spans(name: str, value: Any) -> Spans:
@@ -90,6 +63,30 @@ def _pair(name: str, value: Any) -> tuple[float, float]:
             "and the last time may be infinite"
         )
     return begin, end
+
+
+@dataclass(frozen=True)
+class Opening(Validated):
+    """A volume in which a wall is not there between some times; `openings` of a surface hold them.
+
+    Args:
+        surface: the volume, a surface without openings, laws and motion.
+        times: pairs (t0, t1) [s] that ascend, from 0 s on: it is open from t0 on and shut again from t1 on, which is
+            infinite in the last pair if it stays open. None: it is always open, as a surface is by itself.
+        between: True: only walls between rooms of a `Union` are open in it, so that a door may reach the floor.
+
+    Raises:
+        SceneError: the times are no such pairs.
+
+    >>> import swarm
+    >>> valve = swarm.Opening(swarm.Sphere(0.1, center=(0.0, 0.0, 0.5)), times=[(1.0, 2.5)])
+    >>> swarm.Sphere(0.5, openings=[valve]).openings[0].times
+    ((1.0, 2.5),)
+    """
+
+    surface: Any
+    times: Annotated[Spans, checked_spans] = None
+    between: Flag = False
 
 
 # --- At a time -------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ lies wholly on other walls is moved a small distance, the *reach*, into the regi
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -122,10 +122,8 @@ def bodies_of(surfaces: Sequence[Surface]) -> Iterator[OneBody]:
             yield OneBody(i, None, surface)
             continue
         some = np.arange(min(len(surface), MOST_BODIES))
-        laws = {one.name: getattr(surface, one.name) for one in fields(surface) if one.kw_only}
-        del laws["rotation"]
         for k, body in enumerate(surface.images(some, surface.centers[some]).solids()):
-            yield OneBody(i, k, replace(body, **laws))
+            yield OneBody(i, k, replace(body, **surface.common()))
 
 
 def first_bodies(surfaces: Sequence[Surface]) -> list[OneBody]:

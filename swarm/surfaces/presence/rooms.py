@@ -1,8 +1,8 @@
 """Unions among the walls of a scene: each a union of rooms, and a room the intersection of the sides of its walls.
 
-A particle is in the rooms that contain it, to a small distance, `Walls.slack`. Its flight leaves a union where it
-leaves the last of these, unless it is inside of another room there by more than that: then it goes on, in the next
-pass. So rooms that touch without overlapping stay apart, and no round-off lets a particle out at an edge.
+A particle is in every room that contains it to within a small distance, `Walls.slack`. Its flight leaves a union where
+it leaves the last of these rooms. If it is inside of another room there, by a few times that distance, it goes on in
+the next pass. So rooms that touch without overlapping stay apart, and no round-off lets a particle out at an edge.
 
 The functions take the rooms of a union as `Walls.joined` gives them: for each room its walls, as (number, wall, 1/the
 steepness of its level).
@@ -16,14 +16,15 @@ from ...kernel.jit import select
 from ...kernel.vector import square
 from .absence import BEYOND, FLIES, Absence, lie_on_each_other
 
-# A flight goes on into a room that it is inside of by so many times the slack.
+# A flight goes on in another room if it is inside of that by more than so many times the slack.
 _INSIDE = 4.0
 # In unions of at most so many walls a flight goes through several rooms in one pass. For two balls an impact then takes
 # 6.1 ns, in place of 6.7; but for a box, a tube and a box, with eight walls and few doorways, 18 in place of 14.
 _AT_ONCE = 4
-# So many times the slack beyond a wall a particle goes on: there it is in the other room alone.
+# A particle that passes an open wall goes on from so many times the slack behind it: there it is in one room alone.
 _THROUGH = 2.0
-# Walls nearer than so many times the slack touch a particle; more of them than any room has.
+# Walls nearer than so many times the slack touch a particle. A room that does not hold it counts as one with so many
+# of them, more than any room has.
 _TOUCH, _OUT = 1024.0, 1e6
 
 

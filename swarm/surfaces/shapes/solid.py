@@ -20,7 +20,6 @@ from ..time_of_impact.approach import place
 from ..time_of_impact.course import under_way
 from ..time_of_impact.rising import LevelStep
 
-# A step that is no hit has a length, even if its time is 0.
 # Round-off of a part's level, in units of the last place of its largest terms.
 _ULPS = 32.0
 

@@ -15,7 +15,7 @@ from ..time_of_impact.course import Quartic, ball_rise_time, level_and_window, r
 from ..time_of_impact.rising import Bounds, Level, passage_of
 from .common import Distance, ExactChord
 
-# Trials of a time for which the fall is bounded.
+# How often the time is tried for which a fall is bounded.
 _TRIALS = 3
 
 

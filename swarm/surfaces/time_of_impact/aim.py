@@ -11,6 +11,7 @@ proven is left to the safe steps of strides.py, which begin anew.
 import math
 from typing import Any
 
+from ...kernel.elementary import nearly_sine_and_versine_of, reduced, sine_and_versine_of
 from ...kernel.jit import select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import norm
@@ -20,9 +21,12 @@ from .rising import ThirdDerivativeBound, flight_of, nearest_root
 from .safe import closed_hit, seen_by_walls
 from .strides import CLOSED, MET, OTHER, SPEED, TIME
 
-# Of a lane besides what its strides know: the guess, and of each wall until when its passage is free, or else the
-# polynomial at the start.
-_GUESS, WALLS, _OF_WALL = 5, 6, 3
+# Of a lane besides what its strides know: the guess, the way from there to the nearest root, the wall and the parabola
+# that have it, and what round-off at the guess is relative to. Then of each wall until when its passage is free, or
+# else the polynomial at the start; and after these its level at the guess, and then that at the end, of which the bound
+# of f'''/6 takes the place of the steepness.
+GUESS, _WAY, _WALL, _NEAREST, _COORDINATES, WALLS = 5, 6, 7, 8, 11, 12
+_AT_END, _KEPT, _SIXTH, _OF_WALL = 3, 4, 3, 7
 # After the walls are the sine and the versine of each angle at the guess, of so many a wall at most.
 _OF_WAVE, _WAVES = 2, 3
 # Improvements of the guess before the last.
@@ -37,18 +41,30 @@ def start(walls, gravity, course, lane, r, v, remaining):
     longest = select(found.time < remaining, found.time, remaining)
     guess = math.inf
     starts: tuple[Any, ...] = ()
-    known = _known(walls, gravity, speed, r, v, remaining, 0.0)
+    here = with_waves(walls, course, lane) if lacks_passages(walls) else walls
+    known = _known(here, gravity, speed, r, v, remaining, 0.0)
     for _number, one in known:
         way, level = one.seen.drive.passage(one.body, r, v, remaining), one.level
-        mine = level.own_rise() if way is None else way.hits
-        guess = select(mine < guess, mine, guess)
+        if way is not None:
+            guess = select(way.hits < guess, way.hits, guess)
         # A wall without others is met or not: until when it is not met does not matter.
         free = () if way is None else (way.free() if len(known) > 1 else select(way.once, math.inf, 0.0),)
         starts = (*starts, free or (level[0], level[1], level[2]))
-    course[_GUESS, lane] = select(guess < longest, guess, longest)
+    course[GUESS, lane] = select(guess < longest, guess, longest)
     for k, kept in enumerate(starts):
         for i, number in enumerate(kept):
             course[WALLS + k * _OF_WALL + i, lane] = number
+
+
+def guess_by_levels(walls, gravity, course, lane, r, v, remaining):
+    """The guess of a lane, if one of its levels without a passage rises sooner by its parabola at the start."""
+    guess = course[GUESS, lane]
+    for k, (_number, one) in enumerate(_known(walls, gravity, course[SPEED, lane], r, v, remaining, 0.0)):
+        if one.seen.drive.passage(one.body, r, v, remaining) is None:
+            at = WALLS + k * _OF_WALL
+            rise = one.level.of_rows(tuple(course[at + i, lane] for i in range(_AT_END))).own_rise()
+            guess = select(rise < guess, rise, guess)
+    course[GUESS, lane] = guess
 
 
 def start_series(walls, gravity, course, lane, r, v, remaining):
@@ -58,21 +74,22 @@ def start_series(walls, gravity, course, lane, r, v, remaining):
             course[WALLS + k * _OF_WALL + i, lane] = one.level[i]
 
 
-def put_waves_at_guess(walls, course, lane, remaining, is_last):
-    """The waves of all motions at the guess of a lane.
-
-    Before the last improvement an error of a guess leaves its third power.
-    """
-    put_waves(walls, course, lane, remaining - course[_GUESS, lane], not is_last)
+def put_angles_at_guess(walls, course, lane, remaining):
+    """The `reduced` angles of all motions at the guess of a lane."""
+    put_angles(walls, course, lane, remaining - course[GUESS, lane])
 
 
-def put_waves(walls, course, lane, left, nearly=False):
-    """The waves of all motions with so much of the frame left, in a loop of its own: two short loops are sooner."""
-    at = _first_wave(walls)
-    for drive in _known_drives(walls):
-        for wave in drive.nearly_waves_at(left) if nearly else drive.waves_at(left):
-            course[at, lane], course[at + 1, lane] = wave
-            at += _OF_WAVE
+def put_angles(walls, course, lane, left):
+    """The `reduced` angles of all motions with so much of the frame left."""
+    for at, rate in _waves(walls):
+        course[at, lane], course[at + 1, lane] = reduced(rate * -left)
+
+
+def put_waves(walls, course, lane, is_guess):
+    """Their waves; at a guess that is improved, of which an error leaves its third power, to some 1e-7."""
+    of = nearly_sine_and_versine_of if is_guess else sine_and_versine_of
+    for at, _rate in _waves(walls):
+        course[at, lane], course[at + 1, lane] = of(course[at, lane], course[at + 1, lane])
 
 
 def with_waves(walls, course, lane):
@@ -86,11 +103,11 @@ def copy_waves(walls, source, i, target, k):
         target[at, k], target[at + 1, k] = source[at, i], source[at + 1, i]
 
 
-def _carry_waves(walls, course, lane, way, proven):
-    """The waves at the guess of a lane so much later, or sooner, if its hit is proven there."""
+def carry_waves(walls, course, lane):
+    """The waves at the guess of a lane, at its hit if that is proven."""
+    way = select(course[MET, lane] >= 0.0, course[_WAY, lane], 0.0)
     for at, rate in _waves(walls):
-        before = Wave(course[at, lane], course[at + 1, lane])
-        course[at, lane], course[at + 1, lane] = select(proven, before.later(rate * way), before)
+        course[at, lane], course[at + 1, lane] = Wave(course[at, lane], course[at + 1, lane]).later(rate * way)
 
 
 def _waves(walls):
@@ -112,54 +129,100 @@ def _known_drives(walls):
     return drives if count <= len(walls.each) * _WAVES else ()
 
 
-def improve(walls, gravity, course, lane, r, v, remaining):
-    """A guess that is nearer to the hit."""
-    guess = course[_GUESS, lane]
+def put_levels(walls, gravity, course, lane, r, v, remaining, is_last):
+    """The levels at the guess of a lane: the one that rises next to it, and before the proof all of them.
+
+    In a loop without a root or a quotient: what waits for these leaves no room for the next lanes.
+    """
+    guess = course[GUESS, lane]
     known = _known(with_waves(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, guess)
-    closed = course[CLOSED, lane]
+    c, b, a, wall = _nearest_rise(known)
+    course[_NEAREST, lane], course[_NEAREST + 1, lane], course[_NEAREST + 2, lane] = c, b, a
+    course[_WALL, lane] = wall
+    if not is_last:
+        return
+    for k, (_number, one) in enumerate(known):
+        course[_COORDINATES, lane] = one.seen.coordinates
+        for i in range(_KEPT):
+            course[WALLS + k * _OF_WALL + _AT_END + i, lane] = one.level[i]
+
+
+def put_way(course, lane):
+    """How far ahead of the guess of a lane, or back, the nearest of its levels rises."""
+    course[_WAY, lane] = nearest_root(*(course[_NEAREST + i, lane] for i in range(3)))
+
+
+def improve(course, lane, remaining):
+    """A guess that is nearer to the hit."""
+    guess, closed = course[GUESS, lane], course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining)
-    way, _wall = _nearest_root(known)
-    after = guess + way
+    after = guess + nearest_root(*(course[_NEAREST + i, lane] for i in range(3)))
     after = select(after < longest, after, longest)
-    course[_GUESS, lane] = select((guess > 0.0) & (after > 0.0), after, guess)
+    course[GUESS, lane] = select((guess > 0.0) & (after > 0.0), after, guess)
+
+
+def _end(course, lane, remaining):
+    """(when the flight of a lane meets a wall or ends, how far that is from the guess, whether it meets one)."""
+    guess, way, closed = course[GUESS, lane], course[_WAY, lane], course[CLOSED, lane]
+    longest = select(closed < remaining, closed, remaining)
+    time = guess + way
+    meets = time < longest
+    return select(meets, time, longest), select(meets, way, longest - guess), meets
+
+
+def put_ends(walls, gravity, course, lane, r, v, remaining):
+    """The levels at the end of the flight of a lane, and the bounds of f'''/6: infinite if it may be no root."""
+    time, way, meets = _end(course, lane, remaining)
+    far, coordinates = abs(way), course[_COORDINATES, lane]
+    known = _known(with_waves(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, course[GUESS, lane])
+    for k, (number, one) in enumerate(known):
+        at = WALLS + k * _OF_WALL + _AT_END
+        level = one.level.of_rows(tuple(course[at + i, lane] for i in range(_KEPT)))
+        sixth = one._replace(level=level).third(time + far) * (1.0 / 6.0)
+        # What is said of the end is said by the parabola at the guess.
+        near = sixth * far * far * far <= EPSILON * coordinates * level.steepness
+        end = level.moved(way, meets & (course[_WALL, lane] == number))
+        course[at, lane], course[at + 1, lane], course[at + 2, lane] = end[0], end[1], end[2]
+        course[at + _SIXTH, lane] = select(near, sixth, math.inf)
 
 
 def prove(walls, gravity, course, lane, r, v, remaining, by_series):
     """The hit of a lane, if it is proven: for walls that only swing by their passages, or `by_series` as for others."""
-    guess, closed = course[_GUESS, lane], course[CLOSED, lane]
-    longest = select(closed < remaining, closed, remaining)
-    known = _known(with_waves(walls, course, lane), gravity, course[SPEED, lane], r, v, remaining, guess)
-    way, wall = _nearest_root(known)
-    meets = guess + way < longest
-    way = select(meets, way, longest - guess)
-    time = select(meets, guess + way, longest)
-    far, proven = abs(way), (guess > 0.0) & (time > 0.0)
-    for k, (number, one) in enumerate(known):
-        mine, level = meets & (wall == number), one.level
-        at, end = WALLS + k * _OF_WALL, level.moved(way, mine)
-        sixth = one.third(time + far) * (1.0 / 6.0)
-        # What is said of the end is said by the parabola at the guess.
-        near = sixth * far * far * far <= EPSILON * one.seen.coordinates * level.steepness
+    time, way, meets = _end(course, lane, remaining)
+    wall, proven = course[_WALL, lane], (course[GUESS, lane] > 0.0) & (time > 0.0)
+    for k, (number, one) in enumerate(_known(walls, gravity, course[SPEED, lane], r, v, remaining, 0.0)):
+        at = WALLS + k * _OF_WALL
+        end = one.level.of_rows(tuple(course[at + _AT_END + i, lane] for i in range(_KEPT)))
+        sixth = course[at + _AT_END + _SIXTH, lane]
+        near = sixth < math.inf
         passage = one.seen.drive.passage(one.body, r, v, remaining)
         if passage is not None and not by_series:
             # A level that may rise twice is left to the series: one flight in a hundred was proven by its end alone.
             free = course[at, lane]
-            once = (free == math.inf) & end.is_admissible()
-            proven = proven & ((once & near) | ((not mine) & (time <= free) & (free < math.inf)))
+            once = (free == math.inf) & near & end.is_admissible()
+            others = (not (meets & (wall == number))) & (time <= free) & (free < math.inf)
+            proven = proven & (once | others)
         else:
             ahead = since = 0.5 * time
             if passage is not None:
                 across = (passage.enters < passage.leaves) & (passage.leaves > 0.0) & (passage.enters < time)
                 ahead, since = select(across, passage.enters, ahead), select(across, passage.leaves, since)
                 ahead, since = select(ahead > 0.0, ahead, 0.0), select(since < time, since, time)
-            start = type(level)(*(course[at + i, lane] for i in range(3)), *level[3:])
-            proven = proven & near & start.is_below(1.0, sixth, ahead, True)
-            proven = proven & end.is_below(-1.0, sixth, time - since, mine)
+            start = one.level.of_rows(tuple(course[at + i, lane] for i in range(_AT_END)))
+            proven = proven & near & start.is_below(sixth, ahead, True) & end.is_below(sixth, time - since, False)
     for _at, rate in _waves(walls):
-        proven = proven & ((not meets) | (abs(rate) * far <= LITTLE_ANGLE))
+        proven = proven & ((not meets) | (abs(rate * way) <= LITTLE_ANGLE))
     course[TIME, lane] = select(proven, time, 0.0)
     course[MET, lane] = select(proven & meets, wall, -1.0)
-    _carry_waves(walls, course, lane, way, proven & meets)
+
+
+def lacks_passages(walls):
+    """Whether some walls have no passage."""
+    found = False
+    for wall in walls.each:
+        if isinstance(wall, Moving) and wall.accelerates and not (wall.drive.only_swings() and wall.body.has_core):
+            found = True
+    return found
 
 
 def has_series(walls):
@@ -173,9 +236,16 @@ def has_series(walls):
 
 def rows(walls):
     """How many rows of the course of a lane are used."""
-    drives = _known_drives(walls)
-    count = sum(len(drive.rates()) for drive in drives)
-    return _first_wave(walls) + count * _OF_WAVE
+    return _first_wave(walls) + len(_waves(walls)) * _OF_WAVE
+
+
+def open_rows(walls):
+    """Those that a lane without a proven hit needs: for a stride, and for the proof by series."""
+    if not has_series(walls):
+        return CLOSED, SPEED
+    levels = tuple(WALLS + k * _OF_WALL + i for k, _wall in enumerate(walls.each) for i in range(_AT_END, _OF_WALL))
+    waves = tuple(at + i for at, _rate in _waves(walls) for i in range(_OF_WAVE))
+    return CLOSED, SPEED, GUESS, _WAY, _WALL, *levels, *waves
 
 
 def is_open(course, lane, remaining):
@@ -192,8 +262,8 @@ def _known(walls, gravity, speed, r, v, remaining, t):
     )
 
 
-def _nearest_root(known):
-    """How far ahead, or back, the first of the parabolas rises that are next to 0 by their slopes, and its wall."""
+def _nearest_rise(known):
+    """The first of the parabolas that rise next to here by their slopes, c + 2 b t + a t^2, and its wall."""
     c, b, a, wall = 0.0, 0.0, 0.0, -1.0
     for number, one in known:
         mine = one.level.ahead()
@@ -201,4 +271,4 @@ def _nearest_root(known):
         sooner = (mine.b > 0.0) & ((b <= 0.0) | (mine.c * b > c * mine.b))
         c, b, a = select(sooner, mine.c, c), select(sooner, mine.b, b), select(sooner, mine.a2, a)
         wall = select(sooner, number, wall)
-    return nearest_root(c, b, a), wall
+    return c, b, a, wall

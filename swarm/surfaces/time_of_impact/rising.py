@@ -215,6 +215,10 @@ class Level(Majorant):
     magnitude: float
     grows: Any = True
 
+    def of_rows(self, given):
+        """The level with the first of its numbers given: three, or four."""
+        return Level(*given, *self[len(given) :])
+
     def third(self, bounds, within):
         """The bound of f''' within that time."""
         moved = self.steepness
@@ -239,9 +243,10 @@ class Level(Majorant):
         """Whether it is not above 0 here."""
         return self.c <= 0.0
 
-    def is_below(self, sign, sixth, within, at_wall):
-        """Whether it is surely below 0 for so long, ahead or, with a sign of -1, back, but for here, at a wall."""
-        return _is_below(self.c, 2.0 * sign * self.b, self.a2, sixth, within, at_wall)
+    def is_below(self, sixth, within, is_start):
+        """Whether it is surely not above 0 for so long, from a start on or back from an end."""
+        slope = 2.0 * self.b if is_start else -2.0 * self.b
+        return _highest(self.c, slope, self.a2, sixth, within, is_start) <= 0.0
 
     def soonest(self, sixth, within, is_first):
         """When it rises at the soonest, if a sixth of f''' is bounded within that time.
@@ -258,6 +263,10 @@ class Between(Record):
     half: float
     bend: float
     radius: float
+
+    def of_rows(self, given):
+        """As of a `Level`."""
+        return self._replace(place=given[0], half=given[1], bend=given[2])
 
     steepness = 1.0
 
@@ -279,11 +288,12 @@ class Between(Record):
         """As of a `Level`."""
         return abs(self.place) <= self.radius
 
-    def is_below(self, sign, sixth, within, at_wall):
+    def is_below(self, sixth, within, is_start):
         """As of a `Level`."""
-        slope = 2.0 * sign * self.half
-        ahead = _is_below(self.place - self.radius, slope, self.bend, sixth, within, at_wall)
-        return ahead & _is_below(-self.place - self.radius, -slope, -self.bend, sixth, within, at_wall)
+        slope = 2.0 * self.half if is_start else -2.0 * self.half
+        ahead = _highest(self.place - self.radius, slope, self.bend, sixth, within, is_start)
+        behind = _highest(-self.place - self.radius, -slope, -self.bend, sixth, within, is_start)
+        return select(behind > ahead, behind, ahead) <= 0.0
 
     def own_rise(self):
         """When the parabola of one of them rises."""
@@ -319,13 +329,13 @@ def nearest_root(c, b, a):
     return select(b > 0.0, -c / select(b > 0.0, bottom, 1.0), math.inf)
 
 
-def _is_below(c, slope, a, sixth, within, at_wall):
-    """Whether c + slope t + a t^2 + sixth t^3 is surely not above 0 for so long; at a wall c is at most round-off."""
-    c, rest, bend = select(at_wall & (c > 0.0), 0.0, c), within * sixth, within * a
-    # The bracket is convex, or grows: it is at most what it is at one of its ends.
-    last = slope + bend + within * rest
+def _highest(c, slope, a, sixth, within, is_start):
+    """A bound of c + slope t + a t^2 + sixth t^3 for so long; at a start c > 0 is round-off."""
+    # The bracket of what t is a factor of is convex, or grows: it is at most what it is at one of its ends.
+    last = slope + within * (a + within * sixth)
     steepest = select(last > slope, last, slope)
-    return c + within * select(steepest > 0.0, steepest, 0.0) <= 0.0
+    c = select(c > 0.0, 0.0, c) if is_start else c
+    return c + within * select(steepest > 0.0, steepest, 0.0)
 
 
 def _root(discriminant):

@@ -113,8 +113,7 @@ def _nearer(seen, body, number, rest, longest):
     depth, way = speed * (0.5 * step.level / select(is_past, step.half, 1.0)), speed * step.time
     sooner_one = step.time < rest.time
     return ShortestStep(
-        *select(sooner_one, (step.time, number, way, room), rest[:4]),
-        *select(is_past, (number, depth), rest[4:]),
+        *select(sooner_one, (step.time, number, way, room), rest[:4]), *select(is_past, (number, depth), rest[4:])
     )
 
 

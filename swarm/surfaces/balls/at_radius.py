@@ -1,0 +1,24 @@
+"""What all walls have in common that the centre of a ball meets, with the distance as their phi."""
+
+from typing import TYPE_CHECKING, Any
+
+from .. import contract
+
+
+class AtRadius(contract.Smooth):
+    """The places at the field `radius` from a wall: phi is the distance from these, and its gradient a unit vector."""
+
+    if TYPE_CHECKING:
+        radius: Any
+
+    def grown(self, radius):
+        return self._replace(radius=radius)
+
+    def distance(self, r):
+        return self.side * self.phi(r)
+
+    def unit_normal(self, r):
+        return self.side * self.gradient(r)
+
+    def clearance(self, r):
+        return -self.distance(r)
