@@ -77,12 +77,14 @@ def passed(compiled: CompiledScene, method: Penalty, matter: Any, world: Any, st
             f"{begin}moves by {size:.3g} m against {met} in one step, and {room}, so that it can jump over it; use "
             f"dt < {reach / size * method.dt:.2g} s, a smaller speed, or Impact"
         )
+    # How many balls share its energy is not known.
+    presses = "" if world.heavy is None else ", and more where a wall with a mass squeezes it"
     wanted = _penalty(method, matter, grains, (i, j), size, MOST_PRESSED * min(radii))
     least = "the radius of the smaller one" if wall < 0 else "its radius"
     return (
         f"{begin}overlaps {met} by {size:.4g} m, more than {least}, {min(radii):g} m, and what comes after is wrong: "
-        f"contacts are too soft for the speed; use a penalty of {wanted:.1e} or more, got {method.penalty:g}, with a "
-        "dt that fits it, a smaller speed, or Impact"
+        f"contacts are too soft for the speed; use a penalty of {wanted:.1e} or more{presses}, got {method.penalty:g}, "
+        "with a dt that fits it, a smaller speed, or Impact"
     )
 
 

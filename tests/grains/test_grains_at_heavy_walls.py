@@ -338,6 +338,13 @@ def test_a_lid_passes_no_ball_where_it_is_fast():
         ran(swarm.Scene([lid]), start, swarm.Penalty(0.1, 1e4), 0.2)
 
 
+def test_a_ball_that_a_piston_squeezes_is_reported():
+    piston = swarm.Plane((0.0, 0.0, 1.0), 0.5, mass=1e3, motion=swarm.Guide((0.0, 0.0, 1.0), speed=-3.0))
+    start = one((0.0, 0.0, 0.1), (0.0, 0.0, 0.0))
+    with pytest.raises(swarm.RunError, match="or more, and more where a wall with a mass squeezes it, got 10000"):
+        ran(swarm.Scene([piston, FLOOR]), start, swarm.Penalty(1e-3, 1e4), 0.5)
+
+
 def test_an_opening_moves_with_its_wall():
     """A hole in a lid that balls have lifted: they leave through it where it is now."""
     hole = swarm.Sphere(0.3, (0.0, 0.0, 0.5))
