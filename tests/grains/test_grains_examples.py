@@ -1,4 +1,4 @@
-"""The scenes of grains in examples/scenes, shorter: a drum that carries them up, a silo that runs out."""
+"""The scenes of grains in examples/scenes, shorter: a drum that carries them up, a silo that runs out, a lid."""
 
 from pathlib import Path
 
@@ -34,6 +34,15 @@ def test_a_drum_carries_grains_up_to_a_slope(compiled_at_once):
     assert 20.0 < angle[-1] < 55.0
     assert seen["wall_work"][-1, 0] > 0.0
     assert seen["energy_error"].max() < 1e-13
+
+
+def test_an_oedometer_weighs_its_lid(compiled_at_once):
+    seen = run_of("oedometer", 60, 0.35, lambda snapshot: float(snapshot.position[2].max()))
+    force = np.diff(seen["impulse"][:, 1])[-1] / 0.05
+    assert force == pytest.approx(0.3 * 9.81, rel=0.02)
+    # The lid lies on the highest grain.
+    assert seen["measured"][-1] + 0.003 == pytest.approx(0.07 + seen["wall_position"][-1, 1, 2], abs=2e-4)
+    assert seen["energy_error"].max() < 1e-12
 
 
 def test_a_silo_is_poured(compiled_at_once):
