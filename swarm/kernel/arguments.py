@@ -81,3 +81,5 @@ def wrap(context: Any, library: Any, described: Any, environment: Any, call_help
     function = ir.Function(module, kind, described.llvm_func_name)
     CallWrapper(context, module, function, described, environment, call_helper, release_gil).build()
     library.add_ir_module(module)
+    if library.is_in_wrapper:
+        library.get_function(function.name).linkage = "internal"
