@@ -280,6 +280,19 @@ def test_a_kernel_that_another_calls_is_traced(monkeypatch, tmp_path):
     assert not inner_kernel.overloads
 
 
+def first_of(numbers):
+    return numbers[0]
+
+
+@pytest.mark.parametrize(("arguments", "alone"), [(4, False), (401, True)])
+def test_a_long_kernel_of_many_arguments_is_in_its_wrapper_too(monkeypatch, tmp_path, arguments, alone):
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
+    kernel = jit.long_kernel(first_of)
+    assert kernel(tuple(map(float, range(arguments)))) == 0.0
+    (made,) = kernel.overloads.values()
+    assert (len(_functions(made.library)) == 1) is alone
+
+
 def _functions(library):
     return [one for one in library._get_module_for_linking().functions if not one.is_declaration]
 
