@@ -19,6 +19,8 @@ from numba.np.numpy_support import as_dtype
 _WORD = np.dtype(np.intp).itemsize
 _HEAD, _ITEMS = object.__basicsize__ // _WORD, tuple.__basicsize__ // _WORD
 _DATA, _SHAPE, _STRIDES = _HEAD, _HEAD + 2, _HEAD + 3
+# To hand on so many numbers takes LLVM a fifth of the first call of balls in a union of three parts.
+_MANY = 400
 _THING, _INDEX = ir.IntType(8).as_pointer(), ir.IntType(8 * _WORD)
 
 
@@ -81,3 +83,5 @@ def wrap(context: Any, library: Any, described: Any, environment: Any, call_help
     function = ir.Function(module, kind, described.llvm_func_name)
     CallWrapper(context, module, function, described, environment, call_helper, release_gil).build()
     library.add_ir_module(module)
+    if library.is_in_wrapper or len(function.args) > _MANY:
+        library.get_function(function.name).linkage = "internal"

@@ -11,7 +11,6 @@ import importlib.util
 import inspect
 import os
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
@@ -24,7 +23,6 @@ import numpy as np
 from numba._dispatcher import compute_fingerprint
 from numba.core import event, sigutils
 from numba.core.caching import FunctionCache
-from numba.extending import typeof_impl
 from numba.np import linalg as blas
 
 from . import emission
@@ -45,7 +43,6 @@ _DIGESTS = "digests"
 _kernels: list[Any] = []
 # Kernels that are compiled, each with the fingerprint of its arguments.
 _found: set[tuple[Any, tuple[bytes, ...]]] = set()
-_compiling = threading.local()
 
 _HERE = Path(__file__).parent
 
@@ -109,12 +106,6 @@ def prepare_helper(function: Any, is_outlined: bool = False, body: Any = None) -
     """Let traces and Numba call a helper, or in its place `body`, which may make arrays."""
     flags = _ALLOCATING if body is not None else _OUTLINE if is_outlined else _INLINE
     prepare(function, flags, outlined=is_outlined, body=body)
-
-
-@typeof_impl.register(Kernel)
-def _typeof_kernel(kernel: Kernel, _context: Any) -> Any:
-    """What Numba compiles because it cannot be traced may call kernels too."""
-    return numba.typeof(kernel.compiled)
 
 
 # Where no context is open, as in `pack`, the sentence goes to the log alone.
@@ -245,15 +236,10 @@ def _compile_once(kernel: Any, compile: Callable[[Any], Any], signature: Any) ->
     The others wait, and find it on disk: 50 runs that start together took the compile time of 50.
     """
     kinds = tuple(sigutils.normalize_signature(signature)[0])
-    # A kernel that is compiled within another takes no lock: no two processes can wait for each other.
-    if getattr(_compiling, "one", False) or _is_found(kernel, kinds):
+    if _is_found(kernel, kinds):
         return compile(signature)
     with held(_lock_of(kernel, kinds)):
-        _compiling.one = True
-        try:
-            return compile(signature)  # looks at the disk first
-        finally:
-            _compiling.one = False
+        return compile(signature)  # looks at the disk first
 
 
 def _key_of(kernel: Any, kinds: Any) -> str:

@@ -61,6 +61,8 @@ where they touch: 6e-16 at their ends. Five cells of grains were written again w
 became that along its normal: 4e-16 at their ends.
 Three cells of grains with friction were written again when few contacts were solved for friction to round-off: 9e-9 at
 the end that is here, which is what it was solved to.
+Eleven cells of walls that move, or turn by their inertia, were written again when contacts took the speeds of particle
+and wall along the normal, and the acceleration of a turning frame one cross product: 1e-15 at their ends.
 
 The runs "cell: ..." are those of cells of `bench.cells` that work, one kind of wall for each engine and capability, and
 their digests are of the final state, the observables and the datasets of the trajectory, but for dates, versions,

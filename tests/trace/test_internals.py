@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from compared import Inner, Record, bits, compiled_only, in_kernel
 from llvmlite import ir
+from llvmlite.binding import Linkage
 from numba import types
 from numba.core import cgutils
 from numba.core.datamodel.registry import default_manager
@@ -250,6 +251,50 @@ def test_numba_asks_a_kernel_to_optimise_its_functions(monkeypatch, tmp_path):
     assert kernel(1.0) == 4.0
     assert asked
     assert min(asked) > 0
+
+
+def test_python_alone_calls_the_machine_code_of_a_kernel(monkeypatch, tmp_path):
+    """Its one function is the wrapper, in this process and in one that loads it."""
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
+    for _process in range(2):
+        kernel = jit.kernel(a_kernel)
+        assert kernel(1.0) == 4.0
+        (made,) = kernel.overloads.values()
+        (alone,) = [one for one in _functions(made.library) if one.linkage == Linkage.external]
+        assert alone.name == made.fndesc.llvm_cpython_wrapper_name
+    assert sum(kernel.stats.cache_hits.values()) == 1
+
+
+@jit.kernel
+def inner_kernel(x):
+    return x * 2.0
+
+
+def outer_kernel(x):
+    return inner_kernel(x) + 1.0
+
+
+def test_a_kernel_that_another_calls_is_traced(monkeypatch, tmp_path):
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
+    assert jit.kernel(outer_kernel)(1.0) == 3.0
+    assert not inner_kernel.overloads
+
+
+def first_of(numbers):
+    return numbers[0]
+
+
+@pytest.mark.parametrize(("arguments", "alone"), [(4, False), (401, True)])
+def test_a_long_kernel_of_many_arguments_is_in_its_wrapper_too(monkeypatch, tmp_path, arguments, alone):
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
+    kernel = jit.long_kernel(first_of)
+    assert kernel(tuple(map(float, range(arguments)))) == 0.0
+    (made,) = kernel.overloads.values()
+    assert (len(_functions(made.library)) == 1) is alone
+
+
+def _functions(library):
+    return [one for one in library._get_module_for_linking().functions if not one.is_declaration]
 
 
 def of_arguments(x, n, record, tables, nothing, flag):

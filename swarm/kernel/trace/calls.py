@@ -98,7 +98,7 @@ def operation(function: Any, typed: Callable[..., Any], *kinds: Any) -> Any:
 def called(function: Any, /, *given: Any, **named: Any) -> Any:
     """A call while a helper is traced."""
     if isinstance(function, Kernel):
-        function = function.compiled
+        function = function.py_func
     if isinstance(function, python_types.MethodType):
         # Before it is looked up: a method of a record may be outlined.
         function, given = function.__func__, (function.__self__, *given)
