@@ -14,7 +14,7 @@ import numpy as np
 
 from ..compiled_scene import CompiledScene
 from ..kernel.arrays import index
-from ..kernel.jit import Array, outlined
+from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, square, vec
 from ..motion import Guide, speed_at_start, unit_axis
@@ -90,8 +90,8 @@ class FreeMotion(Record):
         """What a unit impulse along a normal gives it along that, and the most that one across does across."""
         if self.axis is None:
             return self.lightness, self.lightness
-        along = dot(n, self.axis)
-        part = along * along / square(n)
+        along, size2 = dot(n, self.axis), square(n)
+        part = along * along / select(size2 > 0.0, size2, 1.0)
         return self.lightness * part, self.lightness * (1.0 - part)
 
 

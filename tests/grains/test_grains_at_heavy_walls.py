@@ -1,5 +1,6 @@
 """Walls with a mass that soft balls push: closed forms, conservation, and a loop of its own over whole steps."""
 
+import functools
 import math
 from contextlib import nullcontext
 
@@ -104,9 +105,16 @@ def handful(n=12, seed=3, speed=0.5):
 LAWS = [{}, {"restitution": 0.7}, {"friction": 0.4}, {"restitution": 0.6, "friction": 0.3, "rolling": 0.1}]
 
 
-@pytest.mark.parametrize(("law", "heavy"), [*((law, 0.05) for law in LAWS), (LAWS[3], 1.0)])
-def test_balls_in_a_free_shell_keep_all_momentum_and_energy(law, heavy):
-    shell = swarm.Sphere(0.4, mass=heavy, motion=swarm.Translation((0.3, -0.2, 0.1)), **law)
+SPHERE = functools.partial(swarm.Sphere, 0.4)
+# Three walls of one mass.
+BOX = functools.partial(swarm.Box, (0.25, 0.36, 0.25))
+
+
+@pytest.mark.parametrize(
+    ("law", "heavy", "made"), [*((law, 0.05, SPHERE) for law in LAWS), (LAWS[3], 1.0, BOX), (LAWS[0], 0.05, BOX)]
+)
+def test_balls_in_a_free_shell_keep_all_momentum_and_energy(law, heavy, made):
+    shell = made(mass=heavy, motion=swarm.Translation((0.3, -0.2, 0.1)), **law)
     scene = swarm.Scene([shell], pairs=swarm.Pairs(**law))
     result = ran(scene, handful(), swarm.Penalty(5e-4, 5e3), 0.25, every=0.05)
     seen, all_of_it = result.observables, momentum(result, heavy)
