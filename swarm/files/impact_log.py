@@ -335,7 +335,8 @@ def _among(name: str, numbers: Any, n: int) -> NDArray[np.bool_]:
     for given in listed:
         i = whole(name, given)
         if not 0 <= i < n:
-            raise SceneError(f"{name} must be numbers from 0 to {n - 1}, got {i}")
+            allowed = f"numbers from 0 to {n - 1}" if n else "left out of a scene without any"
+            raise SceneError(f"{name} must be {allowed}, got {i}")
         found[i] = True
     return found
 

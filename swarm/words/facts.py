@@ -63,14 +63,16 @@ def of_result(result: Any) -> dict[str, str]:
 
 def of_log(log: Any) -> dict[str, str]:
     """The content of an `ImpactLog`: the rows of a table."""
-    counts = log.counts()
+    counts, crossings = log.counts(), log.crossings()
+    met = len(log) - counts.sum() - crossings.sum()
     which = len(range(log.count)[:: log.kept]) if isinstance(log.kept, int) else len(log.kept)
     return {
         "impacts": many(counts.sum()),
+        **({"collisions": many(met)} if "partner" in log.dtype.names else {}),
         "frames": frames_of(log.times),
         "particles": f"{which} of {log.count}",
         **rows_of(of_surroundings(log.scene, impacts=counts)),
-        **rows_of(of_counters(log.counters, log.crossings())),
+        **rows_of(of_counters(log.counters, crossings)),
         **rows_of([of_method(log.method)]),
         "columns": ", ".join(log.dtype.names or ()),
         "size": file_size(log.path),

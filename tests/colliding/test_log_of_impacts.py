@@ -7,6 +7,7 @@ from physics import ball_loop
 
 import swarm
 from swarm.run import impacts
+from swarm.words import facts
 
 
 def logged(folder, scene, start, **options):
@@ -83,3 +84,8 @@ def test_a_cell_without_a_surface_has_a_log(tmp_path):
     crossed = [(table["sense"][~met] == sense).sum() for sense in (0, 1)]
     assert crossed == run.observables["crossings"][-1, 0].tolist()
     assert min(crossed) > 0
+    with swarm.load_impacts(tmp_path / "impacts.h5") as log:
+        stated = facts.of_log(log)
+        assert (stated["impacts"], stated["collisions"]) == ("0", str(met.sum()))
+        with pytest.raises(swarm.SceneError, match="surfaces must be left out of a scene without any, got 0"):
+            log.table(surfaces=[0])
