@@ -154,13 +154,18 @@ class GrainsRun(BaseRun):
         return self._scene if seen is None else self._scene.placed(seen.position, seen.orientation)
 
     def _is_clear(self, place: Floats, radius: float, moment: float) -> bool:
-        """Whether a place is clear of the walls that have a mass."""
+        """Whether a place is clear of the walls that have a mass and are there at a moment [s]."""
         if self._heavy is None:
             return True
         # In the frame of each, where it is as it is given.
         places = place[:, None] - motion_of(self._heavy).shift
-        depths = self._scene.distances_outside(places, 0.0, np.full(places.shape[1], radius))
-        return bool((depths[self._heavy.number, np.arange(places.shape[1])] <= 0.0).all())
+        images, size = self._scene.pieces_of_balls(radius).images, np.array([radius])
+        return all(
+            one.reaching_outside(places[:, [k]], size)[0] <= 0.0
+            for k, i in enumerate(self._heavy.number)
+            if self._scene.surfaces[i].is_there(moment)
+            for one in images[i]
+        )
 
     def _rows_of(self, some: NDArray[np.int64]) -> arrays.Grains:
         """The rows of particles with these numbers."""

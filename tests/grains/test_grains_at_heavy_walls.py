@@ -376,6 +376,18 @@ def test_balls_are_not_born_in_a_lid_that_has_come_down():
     assert result.observables["blocked"][-1].tolist() == [1]
 
 
+@pytest.mark.parametrize(("present", "blocked"), [([(0.0, 1.0)], 0), ([(1.0, math.inf)], 1)])
+def test_a_birth_asks_for_the_lid_of_its_time(present, blocked):
+    """Where the lid has come down to, which has left the scene before, or has come since the start."""
+    lid = swarm.Plane((0.0, 0.0, 1.0), 2.0, mass=1.0, motion=swarm.Translation((0.0, 0.0, -1.0)), present=present)
+    above = swarm.Box((0.4, 0.4, 0.2), (0.0, 0.0, 1.5))
+    source = swarm.Source(above, volume=True, times=[1.5], speed=0.1, radius=0.1, blocked="report")
+    scene = swarm.Scene([swarm.Box((0.5, 0.5, 1.5), (0.0, 0.0, 0.5)), lid])
+    result = ran(scene, None, swarm.Penalty(1e-2, 1e4), 1.6, every=0.4, sources=[source], seed=2)
+    assert result.observables["born"][-1].tolist() == [1 - blocked]
+    assert result.observables["blocked"][-1].tolist() == [blocked]
+
+
 def test_a_wall_that_goes_loses_what_it_stores_and_a_lid_moves_on():
     scene = swarm.Scene(
         [swarm.Plane((0, 0, -1), 0.0, present=[(0.0, 0.1)]), swarm.Plane((0, 0, 1), 0.2, mass=1.0, motion=UP)],
