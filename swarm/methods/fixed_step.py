@@ -146,7 +146,7 @@ def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
     if longest is not None and fastest * dt > longest:
         thickness, i = _thinnest(scene, dt, balls)
         speed = fastest + _pace(scene.surfaces[i], balls)
-        moved = "" if scene.surfaces[i].motion is None else ", as it moves"
+        moved = ", as it moves" if speed > fastest else ""
         raise SceneError(
             f"dt must be so small that no particle jumps over a solid in one step, got dt = {dt:g} s, in which the "
             f"fastest flies {speed * dt:.3g} m{moved}, and {_described(scene, i)}; use dt < {thickness / speed:.2g} s, "
@@ -187,8 +187,11 @@ def _of_rows(scene: Scene) -> list[Surface]:
 
 
 def _pace(surface: Surface, balls: bool = False) -> float:
-    """A bound of the speed with which a surface moves [m/s]; of balls without what turns, which their lists follow."""
-    if surface.motion is None:
+    """A bound of the speed with which a surface moves [m/s].
+
+    Of balls without what turns, which their lists follow, and 0 where impacts move it: their moves count against it.
+    """
+    if surface.motion is None or (balls and surface.reacts()):
         return 0.0
     if surface.reacts():
         return math.hypot(*speed_at_start(surface.motion))

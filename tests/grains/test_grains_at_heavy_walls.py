@@ -346,6 +346,17 @@ def test_a_lid_passes_no_ball_where_it_is_fast():
         ran(swarm.Scene([lid]), start, swarm.Penalty(0.1, 1e4), 0.2)
 
 
+def test_a_move_against_a_solid_with_a_mass_is_as_long_as_it_is_thick():
+    """The solid is 0.2 m thick, and moves by 0.12 m in a step, and by 0.4 m."""
+    ball, method = one((0.05, 0.0, 0.0), (0.0, 0.0, 0.0)), swarm.Penalty(2e-4, 5e8)
+    solid = lambda v: swarm.Sphere(0.1, (0.0, 0.0, 0.5), "outside", mass=1e12, motion=swarm.Translation((0, 0, v)))  # noqa: E731
+    result = ran(swarm.Scene([solid(-600.0)]), ball, method, 2e-3)
+    assert result.observables["impacts"][-1] == 1
+    assert result.observables["energy_error"].max() < 1e-13
+    with pytest.raises(swarm.RunError, match=r"moves by 0\.345 m .* solid is 0\.2 m thick.* use dt < 0\.00012 s"):
+        ran(swarm.Scene([solid(-2000.0)]), ball, method, 2e-3)
+
+
 def test_a_ball_that_a_piston_squeezes_is_reported():
     piston = swarm.Plane((0.0, 0.0, 1.0), 0.5, mass=1e3, motion=swarm.Guide((0.0, 0.0, 1.0), speed=-3.0))
     start = one((0.0, 0.0, 0.1), (0.0, 0.0, 0.0))
