@@ -12,7 +12,7 @@ from ..errors import SceneError
 from ..methods import Penalty
 from ..methods.base import Method
 from ..methods.fixed_step import longest_step
-from ..motion import speed_at_start
+from ..motion import Guide, speed_at_start
 from ..pairs import Pairs
 from ..particles import Particles
 from ..scene import Scene
@@ -24,7 +24,8 @@ from .overlaps import Limits
 _LOG = logging.getLogger("swarm")
 # The least restitution with a damper that steps can follow.
 _MOST_DAMPED = 0.01
-# Steps in the shortest contact: with fewer than the first there is a warning, which proposes the second.
+# Steps in the shortest contact, or in half a period of a spring: with fewer than the first there is a warning, which
+# proposes the second.
 _FEWEST, _GOOD = 6.0, 20.0
 
 
@@ -66,6 +67,7 @@ def require_soft_balls(scene: Scene, particles: Particles, method: Method) -> No
     _require_damping(scene)
     _require_steps(particles, method)
     _warn_of_steps(scene, particles, method)
+    _warn_of_springs(scene, method)
 
 
 def _require_damping(scene: Scene) -> None:
@@ -113,6 +115,19 @@ def _warn_of_steps(scene: Scene, particles: Particles, method: Penalty) -> None:
             "dt = %g s is long for the contacts of these balls: %s touch for %.3g s; use dt <= %.2g s, or a softer "
             "penalty", method.dt, which, shortest, shortest / _GOOD,
         )  # fmt: skip
+
+
+def _warn_of_springs(scene: Scene, method: Penalty) -> None:
+    """Warn where a step is a large part of half a period of a wall on a spring."""
+    for i, surface in enumerate(scene.surfaces):
+        motion, mass = surface.motion, surface.mass
+        if mass is not None and isinstance(motion, Guide) and motion.stiffness > 0.0:
+            half = math.pi * math.sqrt(mass / motion.stiffness)
+            if method.dt * _FEWEST > half:
+                _LOG.warning(
+                    "dt = %g s is long for the spring of surfaces[%d]: half a period of %g kg on it is %.3g s; use dt "
+                    "<= %.2g s, or a softer spring", method.dt, i, mass, half, half / _GOOD,
+                )  # fmt: skip
 
 
 def _contact_time(scene: Scene, method: Penalty, mass: float, speed: float) -> float:

@@ -452,6 +452,16 @@ def test_a_light_wall_asks_for_short_steps(caplog):
     assert "the lightest and surfaces[0], 0.0001 kg, touch for 0.000314 s; use dt <= 1.6e-05 s" in caplog.text
 
 
+def test_a_stiff_spring_of_a_wall_asks_for_short_steps(caplog):
+    """Else it swings at another frequency, with the energy kept: by 2 % at six steps in half a period."""
+    lid = lambda stiff: swarm.Plane((0.0, 0.0, 1.0), 0.5, mass=0.1, motion=swarm.Guide((0, 0, 1), stiffness=stiff))  # noqa: E731
+    ball, method = one((0.0, 0.0, 0.2), (0.0, 0.0, 0.0)), swarm.Penalty(1e-3, 1e3)
+    ran(swarm.Scene([FLOOR, lid(2.7e4)]), ball, method, 1e-3)
+    assert "the spring" not in caplog.text
+    ran(swarm.Scene([FLOOR, lid(2.8e4)]), ball, method, 1e-3)
+    assert "the spring of surfaces[1]: half a period of 0.1 kg on it is 0.00594 s; use dt <= 0.0003 s" in caplog.text
+
+
 @pytest.mark.slow
 def test_compiled_steps_with_a_lid_have_the_bits_of_plain_python():
     scene, method = lidded(law=LAWS[3]), swarm.Penalty(5e-4, 5e3)
