@@ -119,9 +119,10 @@ class Particles:
         rows = [(name, f"{row.min():.4g} to {row.max():.4g} {units.get(name, 'm')}") for name, row in held.items()]
         return notebook.table(f"{len(self)} particles", rows)
 
-    def fastest(self) -> float:
-        """The largest speed [m/s]."""
-        return float(np.sqrt(np.nanmax((self.velocity**2).sum(axis=0), initial=0.0)))
+    def fastest(self, against: Floats | None = None) -> float:
+        """The largest speed [m/s], against what moves with a velocity (3,) [m/s] if one is given."""
+        velocity = self.velocity if against is None else self.velocity - against[:, None]
+        return float(np.sqrt(np.nanmax((velocity**2).sum(axis=0), initial=0.0)))
 
     def born(self) -> "Particles":
         """The particles without rows of NaN, which in a frame of a run with sources are particles not yet born.

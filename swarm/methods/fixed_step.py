@@ -139,18 +139,19 @@ def check_turns(method: base.Method, scene: Scene) -> None:
 
 def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
     """Raise a `SceneError` where the fastest particle can jump over a solid in one step, or a solid over it."""
-    balls = particles.radius is not None
-    longest, fastest = longest_step(scene, dt, balls), particles.fastest()
+    balls, fastest = particles.radius is not None, particles.fastest()
     if not balls:
         check_reach("dt", dt, scene, fastest)
-    if longest is not None and fastest * dt > longest:
-        thickness, i = _thinnest(scene, dt, balls)
-        speed = fastest + _pace(scene.surfaces[i], balls)
-        moved = ", as it moves" if speed > fastest else ""
+    solids = [(i, one, _speed_against(one, particles)) for i, one in enumerate(scene.surfaces) if one.is_solid()]
+    if not solids:
+        return
+    i, solid, speed = min(solids, key=lambda one: 2.0 * one[1].size() - one[2] * dt)
+    if speed * dt > 2.0 * solid.size():
+        moved = "" if solid.motion is None else ", as it moves"
         raise SceneError(
             f"dt must be so small that no particle jumps over a solid in one step, got dt = {dt:g} s, in which the "
-            f"fastest flies {speed * dt:.3g} m{moved}, and {_described(scene, i)}; use dt < {thickness / speed:.2g} s, "
-            "or Impact"
+            f"fastest flies {speed * dt:.3g} m{moved}, and {_described(scene, i)}; use dt < "
+            f"{2.0 * solid.size() / speed:.2g} s, or Impact"
         )
 
 
@@ -199,6 +200,14 @@ def _pace(surface: Surface, balls: bool = False) -> float:
     turns = 0.0 if balls else drive.angular_speed() * (surface.extent() + math.hypot(*drive.center))
     fastest: float = drive.fastest + turns
     return fastest
+
+
+def _speed_against(surface: Surface, particles: Particles) -> float:
+    """A bound of the speed of particles against a surface at the start [m/s]."""
+    balls = particles.radius is not None
+    if balls and surface.reacts():
+        return particles.fastest(speed_at_start(surface.motion))
+    return particles.fastest() + _pace(surface, balls)
 
 
 def _thinnest(scene: Scene, dt: float, balls: bool = False) -> tuple[float, int]:

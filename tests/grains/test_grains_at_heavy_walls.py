@@ -347,14 +347,22 @@ def test_a_lid_passes_no_ball_where_it_is_fast():
 
 
 def test_a_move_against_a_solid_with_a_mass_is_as_long_as_it_is_thick():
-    """The solid is 0.2 m thick, and moves by 0.12 m in a step, and by 0.4 m."""
+    """The solid is 0.2 m thick, and moves by 0.12 m in a step; by 0.4 m; by that with the ball; by 0.4 m later."""
     ball, method = one((0.05, 0.0, 0.0), (0.0, 0.0, 0.0)), swarm.Penalty(2e-4, 5e8)
-    solid = lambda v: swarm.Sphere(0.1, (0.0, 0.0, 0.5), "outside", mass=1e12, motion=swarm.Translation((0, 0, v)))  # noqa: E731
-    result = ran(swarm.Scene([solid(-600.0)]), ball, method, 2e-3)
+    solid = lambda v: swarm.Sphere(0.1, (0.0, 0.0, 0.5), "outside", mass=1e12, motion=v)  # noqa: E731
+    slow, fast = swarm.Translation((0.0, 0.0, -600.0)), swarm.Translation((0.0, 0.0, -2000.0))
+    result = ran(swarm.Scene([solid(slow)]), ball, method, 2e-3)
     assert result.observables["impacts"][-1] == 1
     assert result.observables["energy_error"].max() < 1e-13
-    with pytest.raises(swarm.RunError, match=r"moves by 0\.345 m .* solid is 0\.2 m thick.* use dt < 0\.00012 s"):
-        ran(swarm.Scene([solid(-2000.0)]), ball, method, 2e-3)
+    with pytest.raises(SceneError, match=r"flies 0\.4 m, as it moves.* 0\.2 m thick; use dt < 0\.0001 s"):
+        ran(swarm.Scene([solid(fast)]), ball, method, 2e-3)
+    ball.velocity[2] = -2000.0
+    result = ran(swarm.Scene([solid(fast)]), ball, method, 2e-3)
+    assert result.observables["wall_velocity"][-1, 0].tolist() == [0.0, 0.0, -2000.0]
+    ball.velocity[2] = 0.0
+    falls = swarm.Scene([solid(swarm.Guide((0.0, 0.0, 1.0), speed=-800.0))], gravity=(2e6, 0.0, 0.0))
+    with pytest.raises(swarm.RunError, match=r"moves by 0\.246 m .* solid is 0\.2 m thick.* use dt < 0\.00016 s"):
+        ran(falls, one((-0.15, 0.0, 0.0), (0.0, 0.0, 0.0)), method, 2e-3)
 
 
 def test_a_ball_that_a_piston_squeezes_is_reported():
