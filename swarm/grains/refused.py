@@ -10,6 +10,7 @@ from ..compiled_scene import CompiledScene
 from ..kernel.limits import TINY
 from ..kernel.vector import dot, norm, square
 from ..methods import Penalty
+from ..methods.fixed_step import thinnest
 from ..pairs import MOST_PRESSED
 from . import grain_arrays as col
 from .contacts import apart
@@ -71,7 +72,11 @@ def passed(compiled: CompiledScene, method: Penalty, matter: Any, world: Any, st
     begin = f"the step at {moment:.9g} s failed at particle {grains.number[i]}, at ({where}) m: it "
     radii = [grains.place[k, col.RADIUS] for k in (i, j)[: 1 + (wall < 0)]]
     if status == Status.TOO_FAST:
-        reach = sum(radii) if wall < 0 else matter.limits.longest
+        reach = sum(radii)
+        if wall >= 0:
+            # With the way of a solid that moves by itself.
+            reach, _solid = thinnest(compiled.scene, method.dt, balls=True)
+            size += reach - matter.limits.longest
         room = f"their radii are {reach:.3g} m in all" if wall < 0 else f"the thinnest solid is {reach:.3g} m thick"
         return (
             f"{begin}moves by {size:.3g} m against {met} in one step, and {room}, so that it can jump over it; use "

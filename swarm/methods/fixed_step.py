@@ -93,7 +93,7 @@ class SoftWalls(base.Method):
         return regularisation(self.penalty, self.exponent)
 
     def too_fast(self, scene: Scene) -> str:
-        thin = _described(scene, _thinnest(scene, self.dt)[1])
+        thin = _described(scene, thinnest(scene, self.dt)[1])
         return f"with dt = {self.dt:g} s and {thin}; use a smaller dt, or Impact"
 
 
@@ -170,7 +170,7 @@ def longest_step(scene: Scene, dt: float, balls: bool = False) -> float | None:
     """The longest flight of points, or of balls, in a step that jumps over no solid [m]; None without solids."""
     if not any(surface.is_solid() for surface in scene.surfaces):
         return None
-    thickness, i = _thinnest(scene, dt, balls)
+    thickness, i = thinnest(scene, dt, balls)
     reach = None if balls else scene.reach_of_steps()
     return min(thickness - _pace(scene.surfaces[i], balls) * dt, math.inf if reach is None else reach)
 
@@ -210,7 +210,7 @@ def _speed_against(surface: Surface, particles: Particles) -> float:
     return particles.fastest() + _pace(surface, balls)
 
 
-def _thinnest(scene: Scene, dt: float, balls: bool = False) -> tuple[float, int]:
+def thinnest(scene: Scene, dt: float, balls: bool = False) -> tuple[float, int]:
     """The thickness [m] and the number of the solid that is jumped over first."""
     solids = [(i, surface) for i, surface in enumerate(scene.surfaces) if surface.is_solid()]
     i, surface = min(solids, key=lambda one: (2.0 * one[1].size() - _pace(one[1], balls) * dt, one[0]))

@@ -365,6 +365,12 @@ def test_a_move_against_a_solid_with_a_mass_is_as_long_as_it_is_thick():
         ran(falls, one((-0.15, 0.0, 0.0), (0.0, 0.0, 0.0)), method, 2e-3)
 
 
+def test_a_solid_that_moves_by_itself_is_as_thick_as_it_is_in_the_error_of_a_jump():
+    solid = swarm.Sphere(0.1, (0.0, 0.0, 0.5), "outside", motion=swarm.Translation((0.0, 0.0, -1000.0)))
+    with pytest.raises(swarm.RunError, match=r"moves by 0\.266 m .* solid is 0\.2 m thick.* use dt < 0\.00015 s"):
+        ran(swarm.Scene([solid]), one((0.05, 0.01, 0.0), (0.0, 0.0, 0.0)), swarm.Penalty(2e-4, 5e8), 2e-3)
+
+
 def test_a_ball_that_a_piston_squeezes_is_reported():
     piston = swarm.Plane((0.0, 0.0, 1.0), 0.5, mass=1e3, motion=swarm.Guide((0.0, 0.0, 1.0), speed=-3.0))
     start = one((0.0, 0.0, 0.1), (0.0, 0.0, 0.0))
