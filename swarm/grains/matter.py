@@ -11,7 +11,7 @@ from ..contact.damping import damping_of
 from ..errors import SceneError
 from ..methods import Penalty
 from ..methods.base import Method
-from ..methods.fixed_step import longest_step
+from ..methods.fixed_step import longest_step, way_of_walls
 from ..motion import Guide, speed_at_start
 from ..pairs import Pairs
 from ..particles import Particles
@@ -41,17 +41,18 @@ def matter_of(compiled: CompiledScene, method: Method, radius: NDArray[np.float6
         _losses(law.alpha, pairs),
         tuple(_losses(law.alpha, surface) for surface in surfaces),
         None if scene.period is None else Lengths(*scene.period),
-        _limits(float(radius.min()), longest_step(scene, dt, balls=True)),
+        _limits(float(radius.min()), longest_step(scene, dt, balls=True), way_of_walls(scene, dt)),
         compiled.openings(),
         slips=method.friction_tolerance,  # type: ignore[attr-defined]
     )
 
 
-def _limits(least: float, longest: float | None) -> Limits:
-    """The `Limits` of balls with radii from the least one on [m]."""
+def _limits(least: float, longest: float | None, way: float) -> Limits:
+    """The `Limits` of balls with radii from the least one on [m], at walls that move so far in a step by themselves."""
     # In a move of no more than the least radius no ball passes another's surface, or a triangle, with less than half of
-    # that overlap at both ends.
-    return Limits(0.5 * least, least if longest is None else min(least, longest), longest)
+    # that overlap at both ends; against a wall that moves its way counts too.
+    move = max(least - way, 0.0)
+    return Limits(0.5 * least, move if longest is None else min(move, longest), longest)
 
 
 def _losses(alpha: float, given: Pairs | Surface) -> Losses:

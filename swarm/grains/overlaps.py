@@ -95,15 +95,18 @@ def look_at_wall(matter, wall, grains, near, failed, number):
         r, move, radius = vector_at(place, i, col.X), move_of(matter, grains, i), place[i, col.RADIUS]
         own = met(wall, near.listed, near.spans, c, radius)
         overlap = max(own.gap_of(own.inner(r)), own.gap_of(own.end_inner(r + move)))
+        # A step over an edge
+        if not moves(wall):
+            overlap = max(overlap, own.gap_of(own.inner(r + 0.5 * move)))
+        elif own.pose.turn is None:
+            middle = 0.5 * (own.own_place(r) + own.own_end(r + move))
+            overlap = max(overlap, own.gap_of(own.body.inner(middle)))
         if isinstance(wall, Field) and moves(wall):
             field = now(wall.members)
             start = field.own_place(r)
             r, move = start, field.own_end(r + move) - start
         elif is_heavy(wall):
             move = move - own.displacement()
-        if not moves(wall):
-            # A step over an edge
-            overlap = max(overlap, own.gap_of(own.inner(r + 0.5 * move)))
         is_through = overlap > radius
         if isinstance(wall, Field) and is_of_faces(members_of(wall.members).like):
             # Far behind a part of a face its distance does not tell the sides apart.

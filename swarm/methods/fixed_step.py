@@ -175,6 +175,11 @@ def longest_step(scene: Scene, dt: float, balls: bool = False) -> float | None:
     return min(thickness - _pace(scene.surfaces[i], balls) * dt, math.inf if reach is None else reach)
 
 
+def way_of_walls(scene: Scene, dt: float) -> float:
+    """How far a wall moves by itself in a step, at most, as balls meet it [m]; turns are not counted."""
+    return dt * max((_pace(surface, balls=True) for surface in scene.surfaces), default=0.0)
+
+
 def _half_widths(scene: Scene) -> tuple[float, ...] | None:
     """The half width of the solid of each wall [m], infinite for a cavity; None if no wall has another side."""
     if not any(surface.may_be_passed() for surface in scene.surfaces):

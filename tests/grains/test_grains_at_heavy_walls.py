@@ -365,6 +365,18 @@ def test_a_move_against_a_solid_with_a_mass_is_as_long_as_it_is_thick():
         ran(falls, one((-0.15, 0.0, 0.0), (0.0, 0.0, 0.0)), method, 2e-3)
 
 
+@pytest.mark.parametrize(
+    "motion", [{}, {"mass": 1e9}, {"mass": 1e9, "motion": swarm.Translation((200.0, -200.0, 0.0))},
+               {"motion": swarm.Translation((200.0, -200.0, 0.0))}]
+)  # fmt: skip
+def test_a_step_through_the_corner_of_a_solid_is_refused_however_it_moves(motion):
+    """By 0.26 m along x and y against the box, the ends of which are in no contact."""
+    box = swarm.Box((0.3, 0.3, 0.3), side="outside", **motion)
+    own = np.array([-260.0, 260.0, 0.0]) + (0.0 if "motion" not in motion else np.array([200.0, -200.0, 0.0]))
+    with pytest.raises(swarm.RunError, match=r"overlaps surfaces\[0\] \(Box\) by 0\.12 m, more than its radius"):
+        ran(swarm.Scene([box]), one((0.41, 0.15, 0.0), own), swarm.Penalty(1e-3, 1e6), 3e-3)
+
+
 def test_a_solid_that_moves_by_itself_is_as_thick_as_it_is_in_the_error_of_a_jump():
     solid = swarm.Sphere(0.1, (0.0, 0.0, 0.5), "outside", motion=swarm.Translation((0.0, 0.0, -1000.0)))
     with pytest.raises(swarm.RunError, match=r"moves by 0\.266 m .* solid is 0\.2 m thick.* use dt < 0\.00015 s"):
