@@ -172,7 +172,8 @@ class Body:
     def center_of(self, position: Floats) -> Floats:
         """(3, n) the centres of mass of copies (3, P, n), or with velocities those of the centres."""
         weight = self.mass_matrix.sum(axis=0)
-        return np.asarray(np.tensordot(position, weight / weight.sum(), axes=(1, 0)))
+        # Not by BLAS: its last bit depends on the processor, and on how many copies there are.
+        return np.asarray(sum(part * position[:, point] for point, part in enumerate(weight / weight.sum())))
 
     def inverse_mass(self) -> Floats:
         """(P, P) the inverse of the masses of the points that can move; 0 at anchored ones."""

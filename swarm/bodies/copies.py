@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..common import checks
 from ..errors import SceneError
-from ..kernel.limits import TINY
+from ..kernel.limits import EPSILON, TINY
 from ..motion import led
 from ..particles import Births, Particles, TiedParticles
 from ..scene import Scene
@@ -24,6 +24,8 @@ _LINK = 1e-9
 _AGREED = 1e-9
 # Of a projection: corrections, each of which takes all but the round-off of the equations from what is left.
 _CORRECTIONS = 3
+# The most numbers of systems of ties solved at once.
+_BATCH = 1 << 20
 
 
 class Bodies(TiedParticles):
@@ -235,24 +237,44 @@ def projected(body: Body, position: Floats, velocity: Floats) -> Floats:
 
     v - W J^T (J W J^T)^-1 J v, of the inverse W of the masses of points that can move, and the ties' J v = 0.
     """
-    held, made, inverse = list(ties(body.links, body.guides, position)), velocity.copy(), body.inverse_mass()
-    if not held:
-        return made
-    for copy in range(position.shape[2]):
-        rows = np.zeros((len(held), len(body), 3))
-        for row, tie in zip(rows, held, strict=True):
-            for point, sign in tie.ends():
-                row[point] += sign * tie.normal[:, copy]
-        pushed = np.einsum("pq,aqx->apx", inverse, rows)
-        flat = rows.reshape(len(held), -1)
+    made, inverse, tied = velocity.copy(), body.inverse_mass(), len(body.links) + len(body.guides)
+    many = max(1, _BATCH // max(1, tied) ** 2)
+    for begin in range(0, position.shape[2] if tied else 0, many):
+        some = slice(begin, begin + many)
+        held = list(ties(body.links, body.guides, position[:, :, some]))
+        normal = np.array([tie.normal for tie in held])
+        pushed = np.array([sum(sign * inverse[point] for point, sign in tie.ends()) for tie in held])
+        coupling = np.array([sum(sign * pushed[:, point] for point, sign in tie.ends()) for tie in held])
         # In units of each tie's own, so that a light point beside a heavy one is no singularity.
-        unit = 1.0 / np.sqrt(np.maximum((flat * pushed.reshape(flat.shape)).sum(axis=1), TINY))
-        system = unit[:, None] * (flat @ pushed.reshape(flat.shape).T) * unit
+        unit = 1.0 / np.sqrt(np.maximum(np.diagonal(coupling), TINY))
+        coupling *= unit[:, None] * unit
+        system = coupling[:, :, None] * sum(normal[:, None, axis] * normal[:, axis] for axis in range(3))
         for _correction in range(_CORRECTIONS):
-            speeds = flat @ made[:, :, copy].T.ravel()
-            force = unit * np.linalg.lstsq(system, unit * speeds, rcond=None)[0]
-            made[:, :, copy] -= np.einsum("a,apx->xp", force, pushed)
+            speeds = np.array([_speed(tie, made[:, :, some]) for tie in held])
+            force = unit[:, None] * _solved(system, unit[:, None] * speeds)
+            for one, way, share in zip(force, normal, pushed, strict=True):
+                made[:, :, some] -= (one * way)[:, None] * share[:, None]
     return made
+
+
+def _solved(system: Floats, wanted: Floats) -> Floats:
+    """The x (m, n) of n symmetric systems (m, m, n) with diagonals of 1; 0 in a row that follows from those before.
+
+    Not by LAPACK: its last bit depends on the processor.
+    """
+    upper, x, rows = system.copy(), wanted.copy(), len(wanted)
+    least = 8.0 * rows * EPSILON
+    for k in range(rows):
+        pivot = np.where(upper[k, k] > least, upper[k, k], np.inf)
+        below = k + 1 + np.flatnonzero(upper[k, k + 1 :].any(axis=1))
+        part = upper[k, below] / pivot
+        upper[np.ix_(below, below)] -= part[:, None] * upper[k, below]
+        x[below] -= part * x[k]
+        upper[k, below], x[k] = part, x[k] / pivot
+    for k in reversed(range(rows)):
+        for later in k + 1 + np.flatnonzero(upper[k, k + 1 :].any(axis=1)):
+            x[k] -= upper[k, later] * x[later]
+    return x
 
 
 def _speed(tie: Tie, velocity: Floats) -> Floats:

@@ -61,14 +61,14 @@ def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float =
     middle = probes.mean(axis=0)
     position = _turned(turns, body.points - middle) + middles[:, None]
     velocity = np.zeros_like(position) + speed * directions(random, n)[:, None]
-    weights = body.mass_matrix.sum(axis=1)
-    arms = _turned(turns, body.points - weights @ body.points / weights.sum())
+    arms = _turned(turns, body.points - body.center_of(body.points.T[:, :, None])[:, 0])
     return Bodies(body, position, velocity + spin * np.cross(directions(random, n)[:, None], arms, axis=0))
 
 
 def _probes(scene: Scene, body: Body) -> Floats:
     """(Q, 3) points of the body that must be within the walls."""
-    corners = body.contacts @ body.points if len(body.contacts) else body.points
+    # Not by BLAS: its last bit depends on the processor.
+    corners = np.einsum("kp,px->kx", body.contacts, body.points) if len(body.contacts) else body.points
     if not any(surface.is_solid() for surface in scene.surfaces):
         return corners
     sides = corners[np.concatenate([body.faces[:, (0, 1)], body.faces[:, (1, 2)], body.faces[:, (2, 0)]])]

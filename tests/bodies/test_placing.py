@@ -2,6 +2,9 @@
 
 import itertools
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -15,6 +18,15 @@ FEW = 4.5 / math.sqrt(N)
 CUBE = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
 TETRAHEDRON = swarm.tetrahedron(edge=0.3, mass=2.0)
 CAVITY = swarm.Scene([swarm.Sphere(1.0, (0.5, 0.0, -1.0))])
+
+OF_PROCESSOR = """
+import swarm
+cavity = swarm.Scene([swarm.Sphere(1.0)])
+for body in swarm.dumbbell(0.2, 1.0), swarm.chain(5, 0.3, 1.0), swarm.tetrahedron(0.2, 1.0):
+    placed = swarm.place(cavity, body, 10, speed=1.0, spin=2.0, seed=1)
+    held = swarm.Bodies(body, placed.position, placed.position**2, project=True)
+    print([values.tobytes().hex() for values in (placed.velocity, placed.centers(), held.velocity)])
+"""
 
 
 def centers(bodies):
@@ -165,3 +177,15 @@ def test_errors_name_the_argument(monkeypatch, scene, body, options, parts):
     with pytest.raises(swarm.SceneError) as caught:
         swarm.place(scene, body, **({"n": 2} | options))
     assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+def test_bodies_have_the_same_bits_by_the_blas_of_every_processor():
+    """OpenBLAS can be set to one: where copies are, their centres, and velocities that agree are sums term by term."""
+    seen = {
+        subprocess.run(
+            [sys.executable, "-c", OF_PROCESSOR], env={**os.environ, "OPENBLAS_CORETYPE": processor},
+            capture_output=True, check=True,
+        ).stdout
+        for processor in ("Haswell", "Prescott", "SkylakeX")
+    }  # fmt: skip
+    assert len(seen) == 1
