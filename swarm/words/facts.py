@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -242,10 +243,17 @@ def of_method(method: Method) -> Statement:
     """A method, its step and its other numbers by their names."""
     known = {"penalty", "exponent", "tolerance", "max_sweeps", "sliding_tolerance", "shortest_flight", "contact_step"}
     of_user = ALL_METHODS.kind_of(type(method)) is None
+    left_out = {} if of_user else {one.name: one.default for one in fields(method)}  # type: ignore[arg-type]
     numbers = [
-        f"{name.replace('_', ' ')} {plain(value)}" for name, value in vars(method).items()
-        if (name in known or (of_user and name != "dt")) and isinstance(value, (int, float)) and value
-    ] + ["contact start centred"] * (getattr(method, "contact_start", "") == "centred")  # fmt: skip
+        name.replace("_", " ") + ("" if value is True else f" {value if isinstance(value, str) else plain(value)}")
+        for name, value in vars(method).items()
+        if name != "dt"
+        and (
+            isinstance(value, (int, float)) and value
+            if of_user or name in known
+            else name in left_out and value != left_out[name]
+        )
+    ]
     return Statement("method", ", ".join([titles.of_method(method), *numbers]))
 
 

@@ -148,3 +148,20 @@ def test_labels_are_unique_and_readable():
     found = nouns.labels(scene)
     assert list(found.values()) == ["vessel", "floor", "ball 1", "ball 2", "sphere", "cylinder"]
     assert nouns.labels(swarm.Scene([swarm.Sphere(1.0), floor]))[1, ()] == "plane"
+
+
+def test_the_options_of_a_method_that_were_chosen_are_reported():
+    """Two runs that differ by one of them are told apart; what was left out has no word."""
+    soft = {"dt": 1e-3, "penalty": 1e4}
+    for chosen, words_of_it in [
+        (swarm.Penalty(**soft, friction_tolerance=1e-3), ", friction tolerance 0.001"),
+        (swarm.Penalty(**soft, exponent=1.5, gradient="mean-value"), ", gradient mean-value"),
+        (
+            swarm.AugmentedLagrangian(**soft, adaptive=True, contact_start="centred"),
+            ", adaptive, contact start centred",
+        ),
+        (swarm.AugmentedLagrangian(**soft, on_unconverged="count"), ", on unconverged count"),
+    ]:
+        with row(str(chosen)):
+            assert facts.of_method(chosen).text.endswith(words_of_it)
+    assert facts.of_method(swarm.Penalty(**soft)).text == "Penalty, steps of 1 ms, penalty 10 000, exponent 1"
