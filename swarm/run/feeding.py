@@ -13,6 +13,7 @@ from ..scene import Scene
 from ..sources.ball_places import ball_places
 from ..sources.places import changes
 from ..state import Floats, State
+from .preflight.softness import pace_of
 
 # The number of places that are tried for a birth at one time.
 _TRIES = 16
@@ -68,6 +69,7 @@ class Feed:
         self._over, self._tried, self._blocked = np.zeros((3, sources), np.int64)
         self._earliest, self._counted = np.zeros(sources), np.full(sources, -1)
         self._energy = np.zeros(n)
+        self._pace_of_walls = max((pace_of(surface) for surface in scene.surfaces), default=0.0)
         self._changing = [i for i, one in enumerate(scene.surfaces) if changes(one) and not one.reacts()]
 
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -170,7 +172,7 @@ class Feed:
         """How long to wait before a place is tried again [s]: the time in which a ball moves by a radius.
 
         Its speed is the largest of three: that of the source, that after a fall by the radius, and the root mean square
-        of the speeds of the balls that are there.
+        of the speeds of the balls that are there. Where these are 0 it is a bound of that of the walls.
         """
         source, n = self._births.balls[k], there.radius.size
         radius = source.largest()
@@ -178,12 +180,12 @@ class Feed:
         pace = source.speed or math.hypot(*(source.beam or (thermal,)))
         fall = math.sqrt(2.0 * radius * math.hypot(*(self._scene.gravity or (0.0,))))
         rms = math.sqrt(float((there.velocity * there.velocity).sum()) / n) if n else 0.0
-        pace = max(pace, fall, rms)
+        pace = max(pace, fall, rms) or self._pace_of_walls
         return radius / pace if pace > 0.0 else math.inf
 
     def _next_due(self, now: float) -> float:
-        """When the next birth of any source is due [s]: where nothing moves, a place is tried again then."""
-        times = self._births.time[self._births.source >= 0]
+        """When the next birth is due, or walls come or go [s]: where nothing moves, a place is tried again then."""
+        times = np.append(self._births.time[self._births.source >= 0], self._scene.instants)
         return float(times[times > now].min(initial=math.inf))
 
     def _bear(self, number: int, position: Floats, velocity: Floats, now: float) -> None:

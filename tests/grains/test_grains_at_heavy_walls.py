@@ -425,6 +425,22 @@ def test_a_birth_asks_for_the_lid_of_its_time(present, blocked):
     assert result.observables["blocked"][-1].tolist() == [blocked]
 
 
+@pytest.mark.parametrize("method", [swarm.Penalty(1e-3, 1e4), swarm.Impact()])
+@pytest.mark.parametrize(
+    "lid", [{"mass": 5.0, "motion": swarm.Guide((0, 0, 1), speed=2.0)}, {"motion": swarm.Translation((0.0, 0.0, 2.0))},
+            {"present": [(0.0, 0.3)]}]
+)  # fmt: skip
+def test_a_birth_waits_until_the_wall_in_its_place_has_left(lid, method):
+    """Also where no ball moves, from whose speed follows when a place is tried again."""
+    place = swarm.Box((0.15, 0.15, 0.1), (0.0, 0.0, 0.5))
+    source = swarm.Source(place, volume=True, times=[0.05], speed=0.0, radius=0.08, blocked="wait")
+    scene = swarm.Scene([swarm.Box((0.5, 0.5, 2.0), (0.0, 0.0, 1.0)), swarm.Plane((0.0, 0.0, 1.0), 0.3, **lid)])
+    seen = ran(scene, None, method, 0.5, every=0.05, sources=[source], seed=3).observables
+    assert seen["blocked"][-1].tolist() == [1]
+    assert seen["born"][:3].ravel().tolist() == [0, 0, 0]
+    assert seen["born"][-1].tolist() == [1]
+
+
 def test_a_wall_that_goes_loses_what_it_stores_and_a_lid_moves_on():
     scene = swarm.Scene(
         [swarm.Plane((0, 0, -1), 0.0, present=[(0.0, 0.1)]), swarm.Plane((0, 0, 1), 0.2, mass=1.0, motion=UP)],

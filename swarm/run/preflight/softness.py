@@ -82,7 +82,7 @@ def _falls(scene: Scene, position: Floats) -> Floats:
     return added
 
 
-def _pace(surface: Surface) -> float:
+def pace_of(surface: Surface) -> float:
     """A bound of the speed of a surface with a motion [m/s]."""
     if surface.motion is None:
         return 0.0
@@ -96,7 +96,7 @@ def _pace(surface: Surface) -> float:
 def _speeds(scene: Scene, particles: Particles) -> Floats:
     """The speeds of particles at walls that are known before the run [m/s]: of the start, of a fall, of the walls."""
     own = np.sqrt((particles.velocity**2).sum(axis=0) + _falls(scene, particles.position))
-    return np.asarray(own + max((_pace(surface) for surface in scene.surfaces), default=0.0))
+    return np.asarray(own + max((pace_of(surface) for surface in scene.surfaces), default=0.0))
 
 
 def depths_at_start(scene: Scene, particles: Particles, method: Method) -> Floats | None:
@@ -192,7 +192,7 @@ def of_passing(scene: Scene, method: Method, state: State, particle: int, moment
     outside = np.where(passable[:, None], scene.distances_outside(ways, moment), -np.inf)
     wall = int(np.argmax(outside.max(axis=1)))
     surface = scene.surfaces[wall]
-    speed = math.hypot(*velocity) + _pace(surface)
+    speed = math.hypot(*velocity) + pace_of(surface)
     energy = 0.5 * float(state.mass[particle]) * speed**2 + _stored(method, surface, place[:, None], moment)
     # What it would store where it is as deep as is small.
     entry, inward = _entry(surface, place, velocity, moment)
