@@ -107,7 +107,7 @@ class _Kernel(JITCodeLibrary):  # type: ignore[misc]
     Without any the module takes longer by what is saved.
 
     Only the wrapper that Python calls it by calls the function of a kernel. If others might, LLVM would keep it whole,
-    with all of its arguments, beside a copy in the wrapper: a fourteenth of the first call of points in a sphere.
+    with all of its arguments, beside a copy in the wrapper: a twentieth of the first call of points in a sphere.
     """
 
     is_in_wrapper = True
