@@ -7,19 +7,19 @@ from ..surfaces.walls import Field, Listed
 
 
 def lose(state, i, before, after):
-    """Book what is left of twice the energy per mass."""
+    """Book the loss from `before` to `after` of twice the energy per mass."""
     if before != after:
         state.energy[i] = 0.5 * after
         state.dissipated[i] += 0.5 * (before - after) * state.mass[i]
 
 
 def book(walls, state, i, wall, change, given, loses):
-    """Book a change (before, after) of twice the energy per mass at a wall, which gives so much of it by its motion."""
+    """Book a change (before, after) of twice the energy per mass at a wall; `given` is the work of its motion in it."""
     before, after = change
     if not isinstance(walls, Carried):
         lose(state, i, before, after)
         return
-    # Where nothing is lost all of it is work, to the last digit.
+    # Without losses the whole change is work, to the last digit.
     given = given if loses else after - before
     state.energy[i] = 0.5 * after
     state.dissipated[i] += 0.5 * (before - after + given) * state.mass[i]
@@ -27,13 +27,13 @@ def book(walls, state, i, wall, change, given, loses):
 
 
 def book_work(walls, state, i, wall, given):
-    """Book twice the work per mass of a wall, if it moves."""
+    """Book twice the work per mass of a wall, if walls move."""
     if isinstance(walls, Carried):
         state.impulse[walls.length() + walls.row(wall), i] += 0.5 * given * state.mass[i]
 
 
 def book_step(walls, state, i, wall, change, given, loses):
-    """Book a change (before, after) of twice the energy per mass in a short step, of which `given` is booked."""
+    """Book a change (before, after) of twice the energy per mass in a short step; `given` of it is booked already."""
     before, after = change
     if not isinstance(walls, Carried):
         lose(state, i, before, after)
@@ -42,7 +42,7 @@ def book_step(walls, state, i, wall, change, given, loses):
     if loses:
         state.dissipated[i] += 0.5 * (before - after + given) * state.mass[i]
     else:
-        # What is left is round-off.
+        # The rest is round-off.
         book_work(walls, state, i, wall, after - before - given)
 
 
@@ -50,13 +50,13 @@ def book_step(walls, state, i, wall, change, given, loses):
 
 
 def add_work(walls, impulse, i, wall, given):
-    """The work of walls that move is in the rows after those of the impulses."""
+    """Add the work of a moving wall to the rows of work, which follow the rows of impulses."""
     if isinstance(walls, Carried):
         add_to_rows(walls, impulse, walls.length(), i, wall, given)
 
 
 def add_to_rows(walls, rows, row, i, wall, given):
-    """rows[row + the row of a wall, i] += given, without a branch; of no wall 0 is given."""
+    """Add to rows[row + the row of a wall, i] without a branch; without a wall `given` is 0."""
     if len(walls.each) == 1 and not walls.fields():
         # A loop over rows here would not vectorise.
         rows[row, i] += given
