@@ -1,4 +1,4 @@
-"""The syntax of a function that Python has compiled: where its source is, and whether it is still that."""
+"""The syntax of a function that Python has compiled: the place of its source, and whether the source is unchanged."""
 
 import ast
 import contextlib
@@ -11,12 +11,12 @@ from typing import Any
 
 _STARTED = time.time()
 
-# Names that no function has: the syntax tree knows them, and no text does.
+# Names that no function has: the syntax tree allows them, and no text does.
 FRAME, _TWIN = ".frame", ".twin"
 
 
 def node_of(code: types.CodeType) -> Any:
-    """The syntax of a function, or None where its file is not known or no longer has it."""
+    """Return the syntax of a function, or None if its file is not known or does not contain it any more."""
     text = _text(code.co_filename)
     found = _nodes_at(text, code.co_firstlineno, code.co_name)
     for node in found:
@@ -34,14 +34,14 @@ def arguments(*names: str) -> ast.arguments:
 
 
 def definition(name: str, arguments: ast.arguments, body: list[Any]) -> ast.FunctionDef:
-    """The syntax of a function."""
+    """Return the syntax of a function."""
     made = ast.FunctionDef(name, arguments, body, [], None, None)
     made.type_params = []  # type: ignore[attr-defined]  # from Python 3.12 on
     return made
 
 
 def compiled(node: Any, code: types.CodeType) -> types.CodeType:
-    """A function inside one of its frame and its free variables."""
+    """Return a function inside a function of its frame and its free variables."""
     result = ast.Return(ast.Name(node.name, ast.Load()))
     outer = definition("make", arguments(FRAME, *code.co_freevars), [node, result])
     tree = ast.fix_missing_locations(ast.Module([ast.copy_location(outer, node)], []))
@@ -54,7 +54,7 @@ def _inner(code: types.CodeType) -> types.CodeType:
 
 
 def _compared(code: types.CodeType) -> Any:
-    """The difference of two functions of one line; code itself depends on what the file imports."""
+    """Return the parts that distinguish two functions of one line; code itself depends on the imports of the file."""
     return code.co_names, code.co_varnames, code.co_freevars, [one for one in code.co_consts if one is not None]
 
 
@@ -64,7 +64,7 @@ def _text(file: str) -> str:
 
 
 def _is_as_written(code: types.CodeType, text: str) -> bool:
-    """Whether a function is still what its file says: a user may edit that while a session goes on."""
+    """Whether a function is still as in its file: a user may edit the file during a session."""
     with contextlib.suppress(OSError):
         found = os.stat(code.co_filename)
         if max(found.st_mtime, found.st_ctime) < _STARTED:
@@ -81,12 +81,12 @@ def _codes(file: str, text: str) -> set[types.CodeType]:
 
 
 def _nodes_at(text: str, line: int, name: str) -> list[Any]:
-    """The functions of that name that begin in a line of a text."""
+    """Return the functions of that name that begin in a line of a text."""
     if name != "<lambda>":
         return [one for one in _definitions(text) if one.name == name and _first_line(one) == line]
     inside = [one for one in _statements(text) if one.lineno <= line <= one.end_lineno]
     found = (one for statement in inside for one in ast.walk(statement))
-    # A lambda in a function is met in that as well as in the statement around it.
+    # A lambda in a function is found in the function as well as in the statement around it.
     return list({id(one): one for one in found if isinstance(one, ast.Lambda) and one.lineno == line}.values())
 
 
@@ -104,7 +104,7 @@ def _statements(text: str) -> list[Any]:
 
 @functools.cache
 def _definitions(text: str) -> list[ast.FunctionDef]:
-    """The functions of a text, also those in functions, classes and branches."""
+    """Return the functions of a text, also those in functions, classes and branches."""
     statements = list(_statements(text))
     for one in statements:
         for block in ("body", "orelse", "finalbody"):
