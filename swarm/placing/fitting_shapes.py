@@ -1,4 +1,4 @@
-"""Which walls balls may meet, for what places them and what runs them."""
+"""Which walls balls may meet, for their placement and for runs."""
 
 import math
 
@@ -9,7 +9,7 @@ from ..surfaces.surface import Surface, shown
 
 
 def _nearest_lid(scene: Scene, surface: Surface) -> float:
-    """How far walls of a surface that are parallel to the plane of a scene are from that, where there are any [m]."""
+    """Return the distance of the nearest wall parallel to the plane of a scene, infinite without such walls [m]."""
     across = scene.across()
     if across is None:
         return math.inf
@@ -17,7 +17,7 @@ def _nearest_lid(scene: Scene, surface: Surface) -> float:
 
 
 def require_shapes(scene: Scene, radius: Floats) -> None:
-    """Raise a `SceneError` where balls with these radii may not meet a surface of the scene."""
+    """Raise a `SceneError` if balls with these radii may not meet a surface of the scene."""
     for i, surface in enumerate(scene.surfaces):
         why = surface.why_no_balls()
         if why is not None:
@@ -46,7 +46,7 @@ def require_shapes(scene: Scene, radius: Floats) -> None:
 
 
 def _surer(surface: Surface) -> str:
-    """How a larger radius of curvature becomes certain, where that is known only by a bound of second derivatives."""
+    """Return advice on how a larger radius of curvature becomes certain, if only second derivatives bound it."""
     bounds = [part.curvature for part in surface.surfaces() if hasattr(part, "curvature")]
     if not bounds:
         return ""
