@@ -19,18 +19,18 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SceneError
 
 Vector = tuple[float, float, float]
-# Magnitudes with squares and inverse squares that are finite.
+# Bounds of magnitudes with finite squares and inverse squares.
 SMALLEST, LARGEST = 1e-100, 1e100
 # Bytes for each particle in a run (`python -m bench bars`), and a number of particles that fits into every memory.
 PARTICLE, FEW = 146, 1_000_000
 _DOUBLE = 8
-# Characters of a value that are shown in a sentence.
+# Characters of a value that a message shows.
 _SHOWN = 200
-# The beginning of a sentence about an argument, or about a part of it.
+# The beginning of a message about an argument, or about a part of it.
 _ARGUMENT = re.compile(r"[a-z_]\w*(\[\d+\])*(\.[a-z_]\w*(\[\d+\])*)*( must | has | is |: )")
-# The part of two names that is alike where one is taken for the other.
+# The similarity of two names from which one is taken for the other.
 _SIMILAR = 0.54
-# What names of arguments and kinds are called elsewhere.
+# Other names for arguments and kinds.
 _OTHER_WORDS = {
     "friction": "mu mu_s mu_d cof",
     "restitution": "e cor eps bounce",
@@ -60,20 +60,20 @@ _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0
 
 
 def shown(value: Any) -> str:
-    """The `repr` of a value, in one line of at most 200 characters, for the sentence of an error.
+    """Return the `repr` of a value, in one line of at most 200 characters, for the message of an error.
 
     >>> shown(np.zeros((2, 2)))
     'array([[0., 0.], [0., 0.]])'
     """
     try:
         text = repr(value)
-    except Exception:  # of an object of others, or a number of too many digits
+    except Exception:  # an object with errors, or a number of too many digits
         return f"a {type(value).__name__}"
     return " ".join(text.split())[:_SHOWN]
 
 
 def assign(frozen: Any, **values: Any) -> None:
-    """Set fields of a frozen dataclass, as they have been checked."""
+    """Set fields of a frozen dataclass to checked values."""
     for name, value in values.items():
         object.__setattr__(frozen, name, value)
 
@@ -85,7 +85,7 @@ def of_class(name: str, value: Any, cls: type[Any]) -> None:
 
 
 def is_masked(value: Any) -> bool:
-    """Whether a value is a masked array. Before `numpy.ma` is imported, which takes 8 ms, there are no such arrays."""
+    """Whether a value is a masked array; none exist before `numpy.ma` is imported, which takes 8 ms."""
     module = sys.modules.get("numpy.ma")
     return module is not None and isinstance(value, module.MaskedArray)
 
@@ -142,7 +142,7 @@ def positive_magnitude(name: str, value: Any) -> float:
 
 
 def part(name: str, value: Any, least: float = 0.0) -> float:
-    """`value` as a number from the least one to 1."""
+    """Return `value` as a number from `least` to 1."""
     result = number(name, value, f"a number from {least:g} to 1")
     if not least <= result <= 1.0:
         raise SceneError(f"{name} must be from {least:g} to 1, got {result:g}")
@@ -204,13 +204,13 @@ def _too_large(name: str, given: str, size: float) -> SceneError:
 
 
 def require_memory(name: str, given: str, size: float) -> None:
-    """Raise a `SceneError` if an argument of so many bytes does not fit in the memory of this machine."""
+    """Raise a `SceneError` if an argument of `size` bytes does not fit in the memory of this machine."""
     if size > memory():
         raise _too_large(name, given, size)
 
 
 def particles_fit(name: str, count: int) -> None:
-    """Raise a `SceneError` if this many particles do not fit in the memory of this machine."""
+    """Raise a `SceneError` if `count` particles do not fit in the memory of this machine."""
     count = min(count, 10**300)  # which float() can convert
     if count > FEW:
         require_memory(name, f", got {count:.6g} particles, which take", PARTICLE * count)
@@ -259,7 +259,7 @@ def flag(name: str, value: Any) -> bool:
 
 
 def parts_of(value: Any) -> tuple[Any, ...] | None:
-    """The items of an iterable as a tuple; None for a text, for a class and for what is not iterable.
+    """Return the items of an iterable as a tuple; None for a text, a class and a value that is not iterable.
 
     >>> parts_of(np.array(5.0)) is None, parts_of([1, 2])
     (True, (1, 2))
@@ -268,12 +268,12 @@ def parts_of(value: Any) -> tuple[Any, ...] | None:
         return None
     try:
         return tuple(value)
-    except Exception:  # an array without axes, or an object of others
+    except Exception:  # an array without axes, or an object with errors
         return None
 
 
 def list_of(name: str, value: Any, expected: str, *one: type[Any]) -> tuple[Any, ...]:
-    """`value` as a tuple; an instance of the class `one`, which may be iterable itself, is refused."""
+    """Return `value` as a tuple; refuse an instance of the class `one`, which may be iterable itself."""
     given = None if isinstance(value, one) else parts_of(value)
     if given is None:
         raise SceneError(f"{name} must be a list of {expected}, got {shown(value)}{brackets(value)}")
@@ -281,7 +281,7 @@ def list_of(name: str, value: Any, expected: str, *one: type[Any]) -> tuple[Any,
 
 
 def brackets(value: Any) -> str:
-    """A hint where a class was given in place of an object, or an empty text.
+    """Return a hint if a class was given in place of an object, or an empty text.
 
     >>> brackets(float)
     '; to make one of the class, call it: float(...)'
@@ -290,11 +290,11 @@ def brackets(value: Any) -> str:
 
 
 def entries(name: str, value: Any, count: int, expected: str) -> tuple[Any, ...]:
-    """`value` as a tuple of `count` parts; `expected` says what they are."""
+    """Return `value` as a tuple of `count` parts; `expected` describes them."""
     try:
-        # One more than there should be: what has no end is refused as well.
+        # One more than expected, to refuse an endless iterable.
         parts = tuple(itertools.islice(value, count + 1))
-    except Exception:  # it has no parts, or is an object of others
+    except Exception:  # it has no parts, or is an object with errors
         raise SceneError(f"{name} must be {expected}, got {shown(value)}") from None
     if len(parts) != count:
         came = len(value) if isinstance(value, (list, tuple)) else len(parts) if len(parts) < count else "more"
@@ -328,14 +328,14 @@ def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
         # A broadcast view of one number can have any shape: it is not copied if it would not fit.
         if _DOUBLE * given.size <= memory():
             return given.astype(np.float64, copy=False)
-    except Exception:  # of float(), or of an object of others
+    except Exception:  # of float(), or of an object with errors
         came = value.dtype.name if isinstance(value, np.ndarray) else type(value).__name__
         raise SceneError(f"{name} must be an array of numbers, got {came}") from None
     raise _too_large(name, f", got shape {given.shape}, which takes", _DOUBLE * given.size)
 
 
 def one_of(name: str, value: Any, choices: Iterable[str]) -> str:
-    """`value` if it is one of `choices`; otherwise the error names the closest of them."""
+    """Return `value` if it is one of `choices`; otherwise the error names the closest choice."""
     known = list(choices)
     if isinstance(value, str) and value in known:
         return value
@@ -343,7 +343,7 @@ def one_of(name: str, value: Any, choices: Iterable[str]) -> str:
 
 
 def closest(value: Any, known: Iterable[str]) -> str:
-    """The hint "; did you mean ...?" with the name of the same meaning, or the most similar one, or an empty text.
+    """Return the hint "; did you mean ...?" with a synonym or the most similar name, or an empty text.
 
     >>> closest("mu", ("restitution", "friction")), closest("raduis", ("radius", "center")), closest("x", ("radius",))
     ("; did you mean 'friction'?", "; did you mean 'radius'?", '')
@@ -355,7 +355,7 @@ def closest(value: Any, known: Iterable[str]) -> str:
 
 
 def known_keys(where: str, table: Iterable[str], known: Collection[str], hints: Mapping[str, str] = {}) -> None:
-    """Raise a `SceneError` for a key of a table that is not known; `hints` are those of keys of other tables.
+    """Raise a `SceneError` for an unknown key of a table; `hints` are for keys that belong to other tables.
 
     >>> known_keys("run.", {"untill": 1.0}, ("until", "every"))
     Traceback (most recent call last):
@@ -368,7 +368,7 @@ def known_keys(where: str, table: Iterable[str], known: Collection[str], hints: 
 
 
 def located(where: str, error: object) -> str:
-    """The sentence about a part, after its place: behind a dot where the sentence begins with an argument.
+    """Return a message about a part after its place, joined by a dot if it begins with an argument.
 
     >>> located("surface[0]", "radius must be above 0"), located("surface[0]", "cannot read the mesh part.stl")
     ('surface[0].radius must be above 0', 'surface[0]: cannot read the mesh part.stl')

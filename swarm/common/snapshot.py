@@ -1,4 +1,4 @@
-"""The arrays of the particles at a frame, for readers only: views, or copies that are made when they are read."""
+"""The read-only arrays of the particles at a frame: views, or copies that are made when they are read."""
 
 import gc
 import weakref
@@ -11,20 +11,20 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from .checks import Vector
 
-# Name -> array; None where a run has none.
+# Name -> array; None if a run does not have it.
 Read = Callable[[str], Any]
 
 
 class Snapshot:
-    """The arrays of particles at a frame by their names, each read once and never to be written.
+    """The arrays of particles at a frame by their names, each read once and never written.
 
     Args:
-        read: gives "position", "velocity", "mass", "impacts", and "image", "escape_time", "absorbed_time",
+        read: returns "position", "velocity", "mass", "impacts", and "image", "escape_time", "absorbed_time",
             "radius", "spin" and "collisions" or None for each.
         gravity: [m/s^2], or None.
         period: of the scene [m], or None.
-        there: how many of them, the first ones, are there, or a mask of those (N,); None for all.
-        copies: whether what is read is copied, so that it stays as it is.
+        there: the number of particles that are present, the first ones, or their mask (N,); None for all.
+        copies: whether arrays are copied when they are read, so that they stay the same.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class Snapshot:
         self._views: dict[str, NDArray[Any]] = {}
 
     def read(self, name: str, frame: str) -> Any:
-        """An array of the particles of a frame, which a sentence calls so.
+        """Return an array of the particles of a frame; `frame` is its name in a message.
 
         Raises:
             SceneError: the frame is over.
@@ -75,7 +75,7 @@ class Snapshot:
         return _locked(np.asarray(mass * energy))
 
     def let_go(self) -> list[str]:
-        """Give up all views. Returns the names of views still in use: their values the next frame would change."""
+        """Release all views; return the names of views still in use: the next frame would change their values."""
         views = {name: weakref.ref(view) for name, view in self._views.items()}
         self._views.clear()
         if all(view() is None for view in views.values()):
@@ -84,11 +84,11 @@ class Snapshot:
         return [name for name, view in views.items() if view() is not None]
 
     def end(self) -> None:
-        """Nothing more is read: the next frame begins."""
+        """End reading: the next frame begins."""
         self._read = None
 
 
-# That of a frame that has no arrays.
+# The snapshot of a frame without arrays.
 NOTHING = Snapshot(None)
 
 
@@ -98,7 +98,7 @@ def _locked(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def _view_of(array: NDArray[Any]) -> NDArray[Any]:
-    """A view that cannot be written; it lives as long as any view of it does."""
-    # NumPy makes the views of a view those of the array itself, but not where memory is not an array's.
+    """Return a read-only view, which lives as long as any view of it."""
+    # NumPy makes views of a view those of the array itself, except for memory that no array owns.
     locked: Any = _locked(array.view())
     return np.asarray(memoryview(locked))

@@ -4,7 +4,7 @@ from enum import IntEnum
 
 
 class Status(IntEnum):
-    """Codes that kernels return; the worst of a run becomes one sentence."""
+    """Codes that kernels return; the worst one of a run becomes a message."""
 
     DONE = 0
     INTERRUPTED = 1
@@ -23,7 +23,7 @@ class Status(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """The meaning, for the user."""
+        """Return the meaning, for the user."""
         return _SENTENCES[self]
 
 
