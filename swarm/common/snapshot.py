@@ -99,6 +99,6 @@ def _locked(array: NDArray[Any]) -> NDArray[Any]:
 
 def _view_of(array: NDArray[Any]) -> NDArray[Any]:
     """Return a read-only view, which lives as long as any view of it."""
-    # NumPy makes views of a view those of the array itself, except for memory that no array owns.
+    # NumPy makes views of a view into views of the array itself, except for memory that no array owns.
     locked: Any = _locked(array.view())
     return np.asarray(memoryview(locked))

@@ -132,7 +132,7 @@ def through(walls, gravity, wall, motion):
 
 @outlined
 def open_wall_of(openings, rules, walls, active, r, near):
-    """Return the wall that lets a particle out at its place, of those that hold it, or -1."""
+    """Return the wall, of those that hold a particle, that lets it out at its place, or -1."""
     if lets_out(openings, rules, walls, active.first, r, near):
         return active.first
     return active.second if lets_out(openings, rules, walls, active.second, r, near) else -1.0
@@ -140,7 +140,7 @@ def open_wall_of(openings, rules, walls, active, r, near):
 
 @outlined
 def ended_wall(walls, active, r, near):
-    """Return the wall that has ended at the place of a particle, of those that hold it, or -1."""
+    """Return the wall, of those that hold a particle, that has ended at its place, or -1."""
     if is_absent(ends_of(walls), walls, active.first, r, near, FLIES):
         return active.first
     return active.second if is_absent(ends_of(walls), walls, active.second, r, near, FLIES) else -1.0

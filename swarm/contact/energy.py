@@ -59,7 +59,7 @@ def _stored_in(law, walls, r):
 
 
 def energy_uncertainty(walls, law, over_mass, r, s):
-    """Return the change of the stored energy per mass when each coordinate of r changes by that of s, to first order.
+    """Return the change of the stored energy per mass when each coordinate of r changes by that in s, to first order.
 
     With s a few units of round-off this is the accuracy with which the energy of a stiff wall can be known.
     """
@@ -92,7 +92,7 @@ def restoring_factor(law, walls, after, gravity, budget, ends):
     balanced = abs(missing) <= _ROUND_OFF * uncertainty
     moving = balanced & (speed2 > 0.0)
     part = select(moving, missing / select(moving, speed2, 1.0), 0.0)
-    # Of a particle nearly at rest the speed is round-off of the energy: a Newton step would overshoot.
+    # The speed of a particle nearly at rest is round-off of the energy: a Newton step would overshoot.
     rest = math.sqrt(select(part > -1.0, 1.0 + part, 0.0))
     return select(abs(part) <= _NEAR, 1.0 + 0.5 * part, rest), balanced
 

@@ -27,8 +27,8 @@ PARTS = 5
 SWEEPS = 40
 # The last sweep but one leaves r1 wrong by no more than this fraction of itself, or of the allowed error of a step.
 _STILL, _SLACK = 64.0 * EPSILON, 0.1
-# A sweep multiplies the error of r1 by the turn of the velocity in a composed step, over |v|, times this factor: a
-# third of it, half that of the longest part, if the wall is as curved along the path as across.
+# The fraction of the error of r1 that a sweep leaves, over the turn of the velocity in a composed step over |v|: 1/3,
+# half of the turn of the longest part, if the wall is as curved along the path as across.
 _GAIN = 1.5
 # Round-off of the terms of `defect`, in units of the last place of a coordinate.
 _NOISE = 8.0 * EPSILON
@@ -39,7 +39,7 @@ _ERROR = 0.7
 _SHRINK, _GROW, _SAFE = 0.2, 5.0, 0.85
 # |v|^2 is restored from the energy if it is more than this fraction of its scale: at a turning point it has no digits.
 _FAST = 1e-12
-# Of the time to a stop: each step leaves a thousandth of the speed.
+# The fraction of the time to a stop that a step may take: each step leaves a thousandth of the speed.
 _BEFORE_STOP = 0.999
 # Sliding needs these functions of every wall.
 NEEDS = (

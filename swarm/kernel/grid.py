@@ -200,7 +200,7 @@ def _until_out_of_layers(layers, first, last, x, v, pull):
     if isinstance(pull, MostPull):
         up = rise_quotient(x - above, 0.5 * v, 0.5 * pull.up)
         return up.sooner(rise_quotient(below - x, -0.5 * v, 0.5 * pull.down))
-    # It leaves on the side to which it is pulled, unless it leaves before on the other one.
+    # It leaves on the side to which it is pulled, unless it leaves earlier on the other side.
     turned = pull < 0.0
     a, b = 0.5 * abs(pull), 0.5 * select(turned, -v, v)
     ahead, behind = select(turned, x - below, above - x), select(turned, above - x, x - below)
@@ -233,7 +233,7 @@ def _edge(layers, first, last, v):
 
 
 def one_cell(count: int) -> Grid:
-    """Return a grid of one cell with `count` entries, which are all looked at."""
+    """Return a grid of one cell with `count` entries, which are all tested."""
     low, width, margin = (Vec(*3 * [size]) for size in (-0.5 * ENDLESS, ENDLESS, MARGIN * ENDLESS))
     entries, first = np.arange(count, dtype=np.int32), np.array([0, count, count], np.int32)
     return Grid(low, width, Vec(*3 * [1.0 / ENDLESS]), margin, Vec(1.0, 1.0, 1.0), first, entries)

@@ -51,7 +51,7 @@ class Kernel:
     Args:
         function: the function in plain Python.
         is_long: whether it consists of many short loops, see `compilers.py`.
-        is_wide: whether its vectors have 512 bits where that pays.
+        is_wide: whether its vectors have 512 bits, on processors where that pays.
 
     Attributes:
         py_func: the function.

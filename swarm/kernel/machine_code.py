@@ -86,7 +86,7 @@ def _find_scipy_only() -> None:
 _find_scipy_only()
 
 
-# --- What modules declare --------------------------------------------------------------------------------
+# --- For the declarations of modules ---------------------------------------------------------------------
 
 
 def kernel_of(kernel: Kernel) -> Any:

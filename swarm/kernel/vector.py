@@ -1,6 +1,6 @@
 """Vectors of three numbers, with the operators of Python: the same definitions in kernels and in plain Python.
 
-Numba knows them too: a function that cannot be traced may use them.
+Numba has them too: a function that cannot be traced may use them.
 """
 
 from typing import Any, NamedTuple

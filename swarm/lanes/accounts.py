@@ -46,7 +46,7 @@ def book_step(walls, state, i, wall, change, given, loses):
         book_work(walls, state, i, wall, after - before - given)
 
 
-# --- Of a lane ------------------------------------------------------------------------------------------
+# --- For a lane -----------------------------------------------------------------------------------------
 
 
 def add_work(walls, impulse, i, wall, given):

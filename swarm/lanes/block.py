@@ -213,7 +213,7 @@ def _make_contacts(method, walls, gravity, share, lanes, picked, live):
     """Make the contact of every lane; return whether (a lane has arrived, a lane is hard)."""
     some_arrived, some_hard, watches = False, False, share.watchers.of_impacts()
     at_once = method.lands and isinstance(walls, Aimed)
-    # A hit has the waves of its own wall; a contact that looks around or moves the hit needs those of other walls too.
+    # A hit has the waves of its own wall; a contact that looks around or moves the hit needs those of all walls.
     are_known = aims(walls, gravity) and walls.inset is None and not method.looks_around
     if at_once and not are_known:
         for i in range(index(live)):

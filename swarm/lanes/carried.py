@@ -143,7 +143,7 @@ def _ahead(walls, now, active, r, u, remaining, h):
     return carried + h * (u - now.velocity(active.first, r))
 
 
-# --- While it is carried ---------------------------------------------------------------------------------
+# --- During the motion with the walls --------------------------------------------------------------------
 
 
 @outlined

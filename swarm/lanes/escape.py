@@ -1,4 +1,4 @@
-"""The ends of particles that reach a wall where it is open, or that absorbs or detains them."""
+"""The ends of particles at walls that are open there, or that absorb or detain them."""
 
 import math
 

@@ -142,7 +142,7 @@ def _look_at_all(members, before, lanes, live):
 
 
 def _look_at_near(gravity, members, before, lanes, live):
-    """Find the first hits of all lanes with the bodies near them: those of the cell, or all."""
+    """Find the first hits of all lanes with the bodies near them: the bodies of the cell, or all."""
     course, grid, columns = lanes.course, members.grid, width(members.like)
     seen = LaneFlights(
         unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),

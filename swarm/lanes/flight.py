@@ -185,7 +185,7 @@ def _aim_at_moving(walls, gravity, lanes, live):
     """Prove the hits of lanes with walls in any motion; return the number of the others, which are in `lanes.order`.
 
     The others take one safe step, and aim again in the next pass. Each loop is short: a processor holds some hundred
-    operations that wait for a sine, a root or a quotient, and begins no other lane while they are those of two.
+    operations that wait for a sine, a root or a quotient, and begins no other lane when these belong to two lanes.
     (Measured in a box that turns: levels, their root, bounds and the proof in one loop take 1.2 of the time.)
     """
     course = lanes.course
@@ -259,7 +259,7 @@ def _stride_open(walls, gravity, lanes, some):
     for k in range(index(count)):
         one = Open(starts, k)
         strides.stride(walls, gravity, beside, k, one.r, one.v, one.remaining, True)
-    # A contact takes angles and waves from its course, where a proof has left those of its hit.
+    # A contact takes angles and waves from its course, where a proof has left the ones of its hit.
     for k in range(index(count)):
         aim.put_angles(walls, beside, k, Open(starts, k).remaining - beside[strides.TIME, k])
     _put_waves(walls, beside, count, False)
@@ -302,7 +302,7 @@ def _look_on(walls, gravity, lanes, live):
     """Make looks of all lanes while many need them; return (the number of lanes that need more, the looks left)."""
     left, some = SAFE_STEPS + MORE_STEPS, live
     if not all(wall.looked_at for wall in walls.each):
-        # Many flights meet another wall before they come near to one that is looked at.
+        # Many flights meet another wall before they come near to one that needs looks.
         some = _mark(walls, gravity, lanes, live)
     while left > 0 and _LOOK * some >= live:
         # If all lanes need looks, a single one does not suffice.

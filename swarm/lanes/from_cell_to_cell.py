@@ -21,7 +21,7 @@ from .table import STRIDE, marked_lanes, whole_eights
 
 # The hit of a lane, in rows of `course`.
 _TIME, _WALL = 0, 1
-# The number of blocks of entries that are looked at together, and the usual number for a lane.
+# The number of blocks of entries that are tested together, and the usual number for a lane.
 _BLOCKS, _USUAL = 256, 2
 # Steps of a lane after which the rest of its flight is left to the next pass.
 _MOST = 4000
@@ -45,7 +45,7 @@ class UnderWay(Record):
     owner: Array  # int64, the lane
     last: Array  # the time after which no hit counts
 
-    # The number of rows, and of those of the flight at its start.
+    # The number of rows, and of the rows of the flight at its start.
     width, own = ROWS, 6
 
     def begin(self, i, lane, found):
@@ -55,7 +55,7 @@ class UnderWay(Record):
         self.time[i], self.owner[i] = 0.0, i
         self.last[i] = select(lane.remaining < found, lane.remaining, found)
 
-    # --- What differs for a moving mesh ---
+    # --- The difference for a moving mesh ---
 
     def facets(self, mesh):
         """The facets of the mesh."""
@@ -200,10 +200,10 @@ class UnderWayAtRest(UnderWay):
 class Maybe(Record):
     """The facets that lanes may meet in their cells.
 
-    All are looked up before one is looked at, so that they are fetched from memory together.
+    All are looked up before one is tested, so that they are fetched from memory together.
     """
 
-    place: Array  # int64, the place among the entries of all blocks that are looked at
+    place: Array  # int64, the place among the entries of all blocks that are tested
     lane: Array  # int64
     facet: Array  # int64
 

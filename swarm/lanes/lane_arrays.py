@@ -229,7 +229,7 @@ def none_halted(rows: int) -> Halted:
     return Halted(np.empty(0, np.int64), np.empty((Flying.ROWS + rows, 0)))
 
 
-# --- Of one particle -------------------------------------------------------------------------------------
+# --- For one particle -----------------------------------------------------------------------------------
 
 
 def booked(walls):

@@ -32,7 +32,7 @@ class Sliding(Advanced):
     keep, twice, scale2 = _named.number(), _named.number(), _named.number()
     # The particle and the time left at the last look.
     looked_particle, looked_left = _named.number(), _named.number()
-    # The rows of a particle; those that follow are of the step in a pass.
+    # The rows of a particle; the following rows are of the step in a pass.
     ROWS = _named.count
 
     # Its length, the state of the composition so far, and the forces of the walls at its end.

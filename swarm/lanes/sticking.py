@@ -16,11 +16,11 @@ from .sliding_step import SLOWEST
 
 # Halvings of the interval in which a wall lets go of a particle at rest.
 _HALVINGS = 60
-# The most paces at a time before the lane is looked at again: a frame may have millions, and halts count between them.
+# The most paces at a time before the lane is checked again: a frame may have millions, and halts count between them.
 # (Rejected: a halt in any of them. Motion with a wall in two parts is rounded twice.)
 _MOST_PACES = 128.0
 # Steps in the search for another wall that comes. A wall that is not found after this number is too near to be
-# resolved; after this number in all paces the lane is also looked at again.
+# resolved; after this number in all paces the lane is also checked again.
 _MOST_STEPS = 1e4
 
 

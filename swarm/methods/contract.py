@@ -111,7 +111,7 @@ class MethodNumbers(Record):
         """Whether the class of a method overrides a method of `MethodNumbers`."""
         return getattr(cls, name) is not getattr(MethodNumbers, name)
 
-    # --- What a lane keeps ---
+    # --- The numbers of a lane ---
 
     def constants(self, mass, energy, scale2):
         """Return three numbers of one particle, which only walls change during a run; `own` gives them names.

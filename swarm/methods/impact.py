@@ -174,7 +174,7 @@ class Reflection(contract.MethodNumbers):
     laws: Laws
     contact_step: Any  # h of a chord [s], or None
 
-    # --- What a lane keeps ---
+    # --- The numbers of a lane ---
 
     def constants(self, mass, energy, scale2):
         # Twice the energy per mass, 1/(2 |v|^2) if it is constant, and the slow speed of this particle. This speed does

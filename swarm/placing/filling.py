@@ -22,7 +22,7 @@ from .fitting_shapes import require_shapes
 from .sequential import VolumeBox, is_sparse, place_balls, require_packing, require_size
 
 _BATCH = 1 << 18
-# Trials for each point asked for, before a whole batch is tested.
+# Trials for each requested point, before a whole batch is tested.
 _TRIALS_A_POINT, _FEWEST_TRIALS = 8, 64
 # The search ends if fewer than one in a million points is admissible: of this number, or earlier if the number found
 # is below that by this number of standard deviations.

@@ -73,7 +73,7 @@ class Vacant:
         return 0.5 * math.sqrt(float((self._width[self._axes] ** 2).sum()))
 
     def _left(self, boxes: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return those of the boxes in which there may be a place."""
+        """Return the boxes in which there may be a place."""
         reach, n = self._reach(), boxes.shape[1]
         if not n or reach >= self.radius:
             return boxes

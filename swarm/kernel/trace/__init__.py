@@ -22,6 +22,6 @@ and loops of the package, and of its users, would have to be written so, and pla
     emit        a helper as a function of its own in a kernel, and notes as instructions
     helpers     the bridge to Numba
 
-What cannot be traced (`try`, `with`, lists, a function without a known source) is compiled by Numba as before;
-`helpers.left_to_numba` says why.
+Code that cannot be traced (`try`, `with`, lists, a function without a known source) is compiled by Numba as before;
+`helpers.left_to_numba` has the reasons.
 """

@@ -111,7 +111,7 @@ _now = threading.local()
 
 @contextlib.contextmanager
 def noting(notes: list[Any], context: Any = None) -> Iterator[None]:
-    """Let a thread note its trace; without a context that of the trace around it."""
+    """Let a thread note its trace; the default context is that of the trace around it."""
     before = getattr(_now, "notes", None), getattr(_now, "context", None)
     _now.notes, _now.context = notes, context or before[1]
     try:

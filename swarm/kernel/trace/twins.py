@@ -168,7 +168,7 @@ class _TwinWriter(ast.NodeTransformer):
     # --- Statements ---
 
     def _block(self, statements: Any, last: bool = False) -> list[Any]:
-        """Return statements without those that are never reached."""
+        """Return statements without unreachable ones."""
         made: list[Any] = []
         for statement in statements:
             written = self.visit(statement)

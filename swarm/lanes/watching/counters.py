@@ -1,7 +1,7 @@
 """Counters look at flights in lanes, and at steps of sliding particles, after they are done, and change no bit of them.
 
-Each particle has a side of each counter. A flight is looked at from this side, crosses where it leaves the side, and
-is then looked at from the other side: so crossings out minus crossings back are the change of the number outside,
+Each particle has a side of each counter. A flight is followed from this side, crosses where it leaves the side, and
+is then followed from the other side: so crossings out minus crossings back are the change of the number outside,
 exactly. A particle that ends a flight on a counter, within round-off, crosses it in the next flight, or not at all if
 it is turned round there. So a counter at the place of a wall counts no particle, and a counter at a face of a periodic
 cell counts each particle once.

@@ -43,7 +43,7 @@ class Struck(Record):
     """An impact of a particle on a wall or on another particle, or its passage through an opening."""
 
     particle: Any
-    wall: Any  # -1 where it meets a particle, below -1 a counter
+    wall: Any  # -1 if it meets a particle, below -1 a counter
     time: float  # [s]
     r: Vec
     before: Vec  # velocity before

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 
 class Followed(NamedTuple):
-    """The arrays that counters write to: those of the particles, and the log, or None."""
+    """The arrays that counters write to: the arrays of the particles, and the log, or None."""
 
     state: Any
     log: Any
