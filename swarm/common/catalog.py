@@ -105,9 +105,11 @@ OBSERVABLES: dict[str, Observable] = {
     "member_heat": Observable("J", "heat from the member since the start", ("member",)),
     "member_absorbed": Observable("1", "particles that a law of the member has absorbed", ("member",)),
     "crossed_momentum": Observable(
-        "kg m s-1", "momentum of what crossed the counter: out, back", ("counter", "sense", "axis")
+        "kg m s-1", "momentum of the particles that crossed the counter: out, back", ("counter", "sense", "axis")
     ),
-    "crossed_energy": Observable("J", "kinetic energy of what crossed the counter: out, back", ("counter", "sense")),
+    "crossed_energy": Observable(
+        "J", "kinetic energy of the particles that crossed the counter: out, back", ("counter", "sense")
+    ),
     "crossed_slowness": Observable("s m-1", "sum of 1/|v_n| at the counter: out, back", ("counter", "sense")),
     "wall_energy": Observable("J", "energy of the wall with a mass", ("surface",)),
     "wall_position": Observable("m", "displacement of the surface that moves", ("surface", "axis"), joined="same"),

@@ -221,8 +221,8 @@ def owned_in(
         laws = pieces[i].laws
         if any(isinstance(law, str) for law in laws):
             raise SceneError(
-                f"surfaces[{owners[i]}].laws: {laws[0]!r} is Python, of which a file holds the name; build the scene "
-                "in Python, as the run's script does"
+                f"surfaces[{owners[i]}].laws: {laws[0]!r} is a Python object, of which a file has only the name; build "
+                "the scene in Python, as the script of the run does"
             )
         if laws and owned and owned[-1].after == first and owned[-1].laws == laws:
             owned[-1] = owned[-1]._replace(after=float(first + walls))

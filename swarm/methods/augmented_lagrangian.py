@@ -124,7 +124,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
         if self.exponent != 1.0:
             raise SceneError(
                 f'exponent must be 1 with contact_start = "centred", got {self.exponent:g}: the loop ends on the level '
-                "on which the step begins for no other; leave exponent out, or contact_start"
+                "of the start of the step only for 1; leave exponent out, or contact_start"
             )
 
     def check(self, scene: Scene, particles: Particles) -> None:

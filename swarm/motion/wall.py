@@ -259,7 +259,7 @@ def require_freedom(motion: "WallMotion | None", mass: float | None, inertia: fl
     if mass is not None and inertia is None and not (motion is None or isinstance(motion, Translation | Guide)):
         raise SceneError(
             f"motion must be None, a Translation or a Guide where a mass is given, got {motion}; a wall on a spring is "
-            "a Guide with a stiffness, one that turns has an inertia"
+            "a Guide with a stiffness, a wall that turns has an inertia"
         )
     if inertia is not None and not isinstance(motion, Rotation):
         raise SceneError(f"motion must be a Rotation where an inertia is given, got {motion}")

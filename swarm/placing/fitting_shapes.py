@@ -32,8 +32,8 @@ def require_shapes(scene: Scene, radius: Floats) -> None:
         if lid < radius[largest]:
             raise SceneError(
                 f"surfaces[{i}] ({type(surface).__name__}) must be as far from the plane as the largest radius, "
-                f"{radius[largest]:g} m of particle {largest}, where it is across it, got {lid:g} m; make it endless, "
-                f"or longer along {scene.plane}"
+                f"{radius[largest]:g} m of particle {largest}, at its walls parallel to the plane, got {lid:g} m; make "
+                f"it endless, or longer along {scene.plane}"
             )
         if not radius[largest] < surface.largest_ball():
             where = surface.most_bent_at()

@@ -174,7 +174,7 @@ def _full(
     if not done.any() and not fitting:
         return SceneError(
             f"radius must leave a place within the walls, got {radius[first]:g} m of particle {first}, for which none "
-            f"of {tried} random places is; use smaller balls, or a larger vessel"
+            f"of {tried} random places is large enough; use smaller balls, or a larger vessel"
         )
     reached = balls_volume(scene, radius[done]) / room.volume
     return SceneError(

@@ -22,8 +22,8 @@ _CLEAR = 1e-9
 # The advice, and the failed search, by the argument that can be changed: for balls, and for bodies, which have a size.
 _MEND = {"radius": "use smaller balls, or a larger source", "where": "move it, or make it larger"}
 _LACKING = {
-    "radius": "got {:g} m, for which none of {} random places is; ",
-    "where": "got none for the ball of {:g} m around a body, of {} random places; ",
+    "radius": "got {:g} m, for which none of {} random places is large enough; ",
+    "where": "got none that is large enough for the ball of {:g} m around a body, of {} random places; ",
 }
 
 

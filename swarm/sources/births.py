@@ -273,7 +273,7 @@ def _require_free(scene: Scene, name: str, times: Floats, position: Floats) -> N
             raise SceneError(
                 f"{name} must be free when particles come, got a birth at {times[k]:g} s at "
                 f"{tuple(position[:, k].tolist())}, {depths[k]:.3g} m inside surfaces[{i}] ({type(surface).__name__}) "
-                "as it is then; move the source, or say with start and stop when it is free"
+                "at this time; move the source, or give a start and a stop between which it is free"
             )
 
 

@@ -222,8 +222,8 @@ class PointBatches:
             phi = surface.phi(np.array(list(itertools.product(*zip(low, high, strict=True)))).T)
             if not (phi.min() <= slack and phi.max() >= -slack) and len(axes) == len(self._scene.axes()):
                 raise SceneError(
-                    f"{self._beginning()}, which is {np.abs(phi).min():.6g} m or more away from where births can be; "
-                    "move it"
+                    f"{self._beginning()}, which is {np.abs(phi).min():.6g} m or more away from the places where "
+                    "births can be; move it"
                 )
 
     def _axes_of_bounds(self) -> list[int]:

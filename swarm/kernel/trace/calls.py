@@ -67,7 +67,7 @@ def _is_instance(value: Any, made: Any) -> bool:
     """Whether a value is of a class; a number of a kernel is no record."""
     classes = made if isinstance(made, tuple) else (made,)
     if isinstance(value, Value) and not all(isinstance(one, type) and issubclass(one, _RECORDS) for one in classes):
-        raise TraceError("it asks of which class a number is that is known in the kernel only")
+        raise TraceError("it asks for the class of a number that is known in the kernel only")
     return isinstance(value, made)
 
 

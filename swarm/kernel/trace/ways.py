@@ -81,7 +81,7 @@ def goes_round(before: Any, slots: Any, wider: Any, assign: Assign, value: Any, 
     if slot is None and _is_same(before, value):
         return True
     if slot is None or not is_number(value):
-        raise TraceError("a variable of a loop is something else in the first round than later")
+        raise TraceError("a variable of a loop has another type in the first round than later")
     assign.pairs.append((slot, value))
     kind = unified([slot.kind, kind_of(value)])
     if kind == slot.kind:
