@@ -43,7 +43,7 @@ _FOLDERS = [
     ("grains", "grains", "arrays=grain_arrays described=matter soft=matter"),
     ("run", "run", "state=starting_state"),
     ("placing", "placing", "shapes=fitting_shapes"),
-    ("surfaces.data", "surfaces.data", "cells=sample_cells numbers=sampled_numbers"),
+    ("surfaces.data", "surfaces.data", "cells=sample_cells flight=sampled_numbers numbers=sampled_numbers"),
     ("surfaces.facets", "surfaces.facets", "cells=facet_cells room=free_room"),
     ("surfaces.laws", "surfaces.laws", "numbers=law_numbers"),
     ("lanes", "lanes.watching", "counted_lanes counters counts crossings log"),

@@ -66,7 +66,7 @@ def foot_of(numbers: Any, most: float, bend: float, box: Box = UNBOUNDED, known:
     return ByFoot(numbers, 0.0, float(most), float(bend), low, high, float(known))
 
 
-def _nearer(points: Floats, value: Any, slope: Any) -> Floats:
+def nearer(points: Floats, value: Any, slope: Any) -> Floats:
     """Newton's step of points (3, N) onto a surface along the gradient."""
     normal = slope(points)
     with np.errstate(all="ignore"):
@@ -77,7 +77,7 @@ def onto(points: Floats, value: Any, slope: Any) -> Floats:
     """Points (3, N) moved onto a surface along the gradient; those that come to it near where they were."""
     size, to = np.ptp(points, axis=1).max(), points
     for _move in range(_ONTO):
-        to = _nearer(to, value, slope)
+        to = nearer(to, value, slope)
     with np.errstate(all="ignore"):
         found = np.abs(value(to)) <= _NEAR * size * np.sqrt((slope(to) ** 2).sum(axis=0))
     return to[:, found & (np.abs(to - points).max(axis=0) <= 0.1 * size)]
@@ -94,7 +94,7 @@ def tightest_of(points: Floats, value: Any, slope: Any, most: float) -> tuple[fl
     while step > _SHORTEST * float(np.abs(points).max()):
         trial = best + step * random.normal(size=best.shape)
         for _move in range(_MOVES):
-            trial = _nearer(trial, value, slope)
+            trial = nearer(trial, value, slope)
         there = np.sqrt((slope(trial) ** 2).sum(axis=0))
         less = (there < steep) & (np.abs(value(trial)) <= near)
         best, steep = np.where(less, trial, best), np.where(less, there, steep)

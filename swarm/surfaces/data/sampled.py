@@ -21,8 +21,8 @@ from ..balls.parallel import Parallel, foot_of, onto, tightest_of
 from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, shown, side_sign
 from . import spline
 from .arrays import read_samples
-from .flight import SampledNumbers
 from .sample_cells import SampleCells, cells_of, eigenvalues, least_at_border, most_bent_within
+from .sampled_numbers import SampledNumbers
 from .spline import Spline
 
 # A spline that changes its sign between two samples of the same sign, by more than this part of what phi changes in a

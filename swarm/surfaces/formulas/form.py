@@ -17,7 +17,8 @@ from ...kernel.vector import Vec, vec
 from ...state import Floats
 from .. import rotation as rotations
 from ..balls.by_foot import ByFoot
-from ..balls.parallel import Parallel, foot_of, tightest_of
+from ..balls.parallel import Parallel, foot_of, nearer, tightest_of
+from ..curvature import matrices_of
 from ..surface import UNBOUNDED, Box, farthest, rotated_box, shown, side_sign
 from .numbers import Bend
 
@@ -353,8 +354,8 @@ class Form:
     def _sharpness(self, points: Floats, step: float) -> Floats:
         """The largest |second derivative| of phi in any direction at each point, by differences of the gradient."""
         entries = self._entries(points, step * np.eye(3)[:, :, None])
-        matrices = np.nan_to_num(entries, nan=0.0, posinf=0.0, neginf=0.0)[[0, 3, 5, 3, 1, 4, 5, 4, 2]]
-        return np.asarray(2.0 * np.abs(np.linalg.eigvalsh(matrices.T.reshape(-1, 3, 3))).max(axis=1))
+        matrices = matrices_of(np.nan_to_num(entries, nan=0.0, posinf=0.0, neginf=0.0))
+        return np.asarray(2.0 * np.abs(np.linalg.eigvalsh(matrices)).max(axis=1))
 
     def _entries(self, points: Floats, step: Floats) -> Floats:
         """The entries of side H, H = grad grad phi/2, at points by differences of the gradient, (6, N)."""
@@ -367,9 +368,7 @@ class Form:
         low, high = (np.array(UNBOUNDED) if self.box is None else np.array(self.box))[:, :, None]
         start = np.abs(self.value(points)).max()
         for _ in range(_MOVES):
-            slope = self.slope(points)
-            with np.errstate(all="ignore"):
-                points = points - self.value(points) / (slope**2).sum(axis=0) * slope
+            points = nearer(points, self.value, self.slope)
         inside = ((points >= low) & (points <= high)).all(axis=0)
         return points[:, inside & (np.abs(self.value(points)) <= 1e-6 * start)]
 
