@@ -10,7 +10,7 @@ from ..kernel.vector import ZERO, vec
 from ..run.observed import Observed, observed_of
 from ..scene import Scene
 from ..state import Floats
-from ..surfaces.depth import penetration
+from ..surfaces.walls import penetration
 from .balls_run import CollidingRun
 from .colliding.heavy import COUNTS, Heavy
 from .reacting.described import freedoms_of, scenery_of, walls_now

@@ -7,11 +7,11 @@ from ..kernel.gravity import as_vector
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import absolute, dot, square, total
-from .depth import penetration
 from .frames import Framed
 from .presence.openings import is_in_any
 from .shapes.plane import PlaneNumbers
 from .time_of_impact import flights
+from .walls import penetration
 
 
 class Counted(Record):

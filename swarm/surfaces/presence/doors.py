@@ -17,6 +17,7 @@ from ...common.validated import Flag, Validated
 from ...errors import SceneError
 from ...kernel.gravity import as_vector
 from ...kernel.jit import select
+from ...kernel.record import Record
 from ..frames import Unturned
 from ..time_of_impact.course import Fall, Quartic, close
 from ..time_of_impact.rising import LevelStep
@@ -180,6 +181,45 @@ class Present(Unturned):
         return LevelStep(
             self._if_there(step.level, -1.0), self._if_there(step.half, 0.0), self._if_there(step.time, longest)
         )
+
+
+class Ajar(Present):
+    """A wall over a step, and whether it stands: 1, or 0 where it is open to the particle at the start of the step."""
+
+    def displacement(self):
+        return self.body.displacement()
+
+    def swept(self, r0, r1):
+        return self.body.swept(r0, r1)
+
+    def place_scale(self, s):
+        return self.body.place_scale(s)
+
+    def framed(self, r, p):
+        body, start, way = self.body.framed(r, p)
+        return self._replace(body=body), start, way
+
+
+class Faced(Record):
+    """The walls of a scene as one step of a particle meets them."""
+
+    walls: Any
+    stand: tuple[Any, ...]  # of each wall 1, or 0 where it is open
+
+    def length(self):
+        """The number of rows, as that of the walls."""
+        return self.walls.length()
+
+    def at(self, remaining):
+        """The walls when so much of the frame is left [s]."""
+        return self._of(self.walls.at(remaining))
+
+    def during(self, remaining, after):
+        """The walls over a step; at its start and end so much of the frame is left [s]."""
+        return self._of(self.walls.during(remaining, after))
+
+    def _of(self, now):
+        return now._replace(each=tuple(Ajar(wall, one) for wall, one in zip(now.each, self.stand, strict=True)))
 
 
 def walls_then(surface: Any, moment: float, largest: float | None = None) -> tuple[Any, ...]:
