@@ -18,7 +18,6 @@ from .free_room import CLOSED, FREE, KIND, with_blocks, with_cones
 from .members import Facets
 from .mesh_files import Soup
 from .nearest import nearest
-from .triangles import TriangleMesh as Closed
 
 # Bits of a place along each axis, by which triangles are sorted.
 _BITS = 20
@@ -63,7 +62,7 @@ def _whole(name: str, values: Any) -> NDArray[Any]:
     return found
 
 
-def sorted_by_place(mesh: Closed) -> Closed:
+def sorted_by_place(mesh: Soup) -> Soup:
     """The triangles by their groups, those near to each other near: what a cell holds is in few lines of the cache."""
     middles = mesh.vertices[mesh.triangles].mean(axis=1)
     low, wide = middles.min(axis=0), float(np.ptp(middles, axis=0).max()) or 1.0

@@ -141,11 +141,12 @@ class Mesh(Surface):
             soup = given_arrays(self.vertices, self.triangles, self.group, self.names, self.scale)
         # What is in a plane encloses nothing, so that it cannot be a closed mesh that is damaged.
         is_open = self.open or all_in_a_plane(soup.vertices, soup.triangles)
-        mesh = sorted_by_place((sheets if is_open else closed)(path, soup, self.weld))
+        soup, moved = (sheets if is_open else closed)(path, soup, self.weld)
+        mesh = sorted_by_place(soup)
         for values in (mesh.vertices, mesh.triangles, mesh.group):
             values.flags.writeable = False
         own = {name: getattr(mesh, name) for name in ("vertices", "triangles", "group", "names")}
-        settled = {"scale": 1.0, "weld": None, "mesh_weld": mesh.weld or self.mesh_weld or None, "open": is_open}
+        settled = {"scale": 1.0, "weld": None, "mesh_weld": moved or self.mesh_weld or None, "open": is_open}
         checks.assign(self, **own, **settled, _mended=tuple(own.values()))
 
     def _checked_groups(self) -> dict[str, dict[str, Any]] | None:
