@@ -128,9 +128,7 @@ class Posed(Framed):
     accelerates = True
 
     def seen(self, flight, t):
-        remaining = flight.remaining - t
-        pose = self.drive.pose(remaining)
-        return flight.seen(t, Posed(self.body, pose, pose, self.drive, remaining, remaining), flight.pull)
+        return flight.seen(t, self.later(t), flight.pull)
 
     def sees(self, gravity, r, v):
         """A particle in the frame of the wall now, as `Seen`."""

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...common import checks
-from ...common.checks import Vector
 from ...errors import SceneError
 from ...motion import Oscillation, Path, Rotation, Translation, parts_of, unit_axis
 from ..facets.mesh import Mesh
@@ -243,17 +242,12 @@ def into_cell(period: Lengths, points: NDArray[np.float64]) -> tuple[NDArray[np.
 
 def cell_of(period: Lengths) -> Box:
     """Two corners of the cell, infinite where it does not repeat."""
-    low = tuple(-math.inf if length is None else 0.0 for length in period)
-    high = tuple(math.inf if length is None else length for length in period)
-    return _corner(low), _corner(high)
+    x, y, z = (math.inf if length is None else length for length in period)
+    low = [-math.inf if length is None else 0.0 for length in period]
+    return (low[0], low[1], low[2]), (x, y, z)
 
 
 def corners_of(period: Lengths) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The same as arrays (3,)."""
     low, high = cell_of(period)
     return np.array(low), np.array(high)
-
-
-def _corner(values: tuple[float, ...]) -> Vector:
-    x, y, z = values
-    return x, y, z
