@@ -12,7 +12,7 @@ from ...common import checks
 from ...errors import SceneError
 from ...motion import Oscillation, Path, Rotation, Translation, parts_of, unit_axis
 from ..facets.mesh import Mesh
-from ..fields.many import Many
+from ..fields.many import Many, ManyBodies
 from ..outlines.outlined import Outlined
 from ..surface import Box, Surface
 
@@ -48,7 +48,7 @@ def images_of(surface: Surface, period: Lengths, name: str, largest: float = 0.0
     if isinstance(surface, Outlined):
         _require_within(surface, period, name, largest if surface.is_solid() else 0.0)
         return [surface]
-    if isinstance(surface, Many):
+    if isinstance(surface, ManyBodies):
         return [_many_images(surface, period, name, largest)]
     low, high = extent_of(surface)
     shifts: list[list[float]] = [[0.0], [0.0], [0.0]]
@@ -78,7 +78,7 @@ def _require_within(surface: Outlined, period: Lengths, name: str, largest: floa
             )
 
 
-def _many_images(field: Many, period: Lengths, name: str, largest: float) -> Many:
+def _many_images(field: ManyBodies, period: Lengths, name: str, largest: float) -> ManyBodies:
     """A field with the images of its bodies, as far as they reach into the cell."""
     low, high = field.corners()
     shifts = [np.zeros((1, 3))]

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...state import Floats
 from ..facets.flat import DIGITS, keys_of
-from ..fields.many import Many
+from ..fields.many import ManyBodies
 from ..instant import are_there_together, distances, side_of
 from ..surface import Surface
 from .seams import ENOUGH, FAR, OUTSIDE, PLACES, Face, faces_of
@@ -118,7 +118,7 @@ def flush_faces(surfaces: Sequence[Surface]) -> dict[tuple[int, int], float]:
 def bodies_of(surfaces: Sequence[Surface]) -> Iterator[OneBody]:
     """The surfaces, of fields the first bodies."""
     for i, surface in enumerate(surfaces):
-        if not isinstance(surface, Many) or not surface.body_count() or surface.is_foam():
+        if not isinstance(surface, ManyBodies) or not surface.body_count() or surface.is_foam():
             yield OneBody(i, None, surface)
             continue
         some = np.arange(min(len(surface), MOST_BODIES))
@@ -159,7 +159,7 @@ def extended(surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
             rows.setdefault(i, {})[row] = body
     for i, bodies in rows.items():
         field = surfaces[i]
-        assert isinstance(field, Many)
+        assert isinstance(field, ManyBodies)
         made[i] = field.with_bodies(bodies)
     return tuple(made)
 
