@@ -1,7 +1,6 @@
 """Many bodies as triangles, each on a grid of its own, and the box in which a scene is drawn."""
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,7 +94,7 @@ def each_body(surface: Surface, box: Corners) -> tuple[Triangles, NDArray[np.int
     first = 0
     for k in range(0, len(solids), max(1, len(solids) // _MOST_BODIES)):
         solid = solids[k]
-        low, high = (np.array(corner) for corner in replace(solid, side="inside").bounds())  # type: ignore[call-arg]
+        low, high = (np.array(corner) for corner in solid.enclosing_box())
         low, high = own = _around(np.stack([np.maximum(low, box[0]), np.minimum(high, box[1])]), box)
         axes = _axes(own, _BODY)
         gap = -solid.phi(np.array(np.meshgrid(*axes, indexing="ij")).reshape(3, -1)).reshape(3 * (_BODY,))

@@ -171,11 +171,7 @@ class Mesh(Surface):
     def __repr__(self) -> str:
         """The number of triangles, and what is not a default."""
         own = ("open" if self.open else "side", "center", "groups", "mesh_weld", *(one.name for one in fields(Surface)))
-        changed = [one for one in fields(self) if one.name in own and getattr(self, one.name) != one.default]
-        return (
-            ", ".join([f"Mesh(<{len(self)} triangles>", *(f"{f.name}={getattr(self, f.name)!r}" for f in changed)])
-            + ")"
-        )
+        return self._call([f"<{len(self)} triangles>"], [one for one in fields(self) if one.name in own])
 
     # --- For kernels -------------------------------------------------------------------------------------
 
@@ -232,7 +228,7 @@ class Mesh(Surface):
         return (made[largest],)
 
     def faces_of_balls(self, largest: float) -> tuple[Members, Indices]:
-        """As `Many.faces_of_balls`: triangles in one plane, and those of a convex body."""
+        """As `ManyBodies.faces_of_balls`: triangles in one plane, and those of a convex body."""
         corners, face = faces_of(self.corners, self.triangles, 0.0 if self.open else -side_sign(self.side))
         return triangles_of_balls(corners, largest), face
 

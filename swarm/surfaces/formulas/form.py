@@ -19,7 +19,7 @@ from .. import rotation as rotations
 from ..balls.by_foot import ByFoot
 from ..balls.parallel import Parallel, foot_of, nearer, tightest_of
 from ..curvature import matrices_of
-from ..surface import UNBOUNDED, Box, farthest, rotated_box, shown, side_sign
+from ..surface import UNBOUNDED, Box, farthest, rotated_box, shown, side_sign, slopes_of
 from .numbers import Bend
 
 # Central differences lose least at the cube root of round-off, relative to the length.
@@ -230,8 +230,7 @@ class Form:
     def slope(self, points: Floats) -> Floats:
         """Its gradient."""
         with np.errstate(all="ignore"):
-            parts = self.numbers((0.0, 0.0, 0.0)).gradient(vec(points))
-            return np.array(np.broadcast_arrays(*parts, points[0])[:3])
+            return slopes_of(self.numbers((0.0, 0.0, 0.0)), vec(points))
 
     def points(self, n: int) -> Floats:
         """Random points of the box, or around the center if the form has no box."""
