@@ -66,7 +66,5 @@ def as_met(walls, number):
 
 def lowered(walls, number, r):
     """All walls, that with this number lowered to the point r."""
-    each: Any = ()
-    for k, wall in enumerate(walls.each):
-        each = (*each, Lowered(wall, select(number == k, wall.gap_of(wall.inner(r)), 0.0)))
-    return walls._replace(each=each)
+    levels = (select(number == k, wall.gap_of(wall.inner(r)), 0.0) for k, wall in enumerate(walls.each))
+    return walls._replace(each=tuple(map(Lowered, walls.each, levels)))

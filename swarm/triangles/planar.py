@@ -15,6 +15,7 @@ from ..surfaces.rotation import normalized
 from ..surfaces.surface import Surface
 from .curves import runs
 from .cut import Level, SmoothSurface
+from .gridded import Corners, around
 from .parts import Part
 
 # Points along each side of the grid on which curves are found, and of a small body on a grid of its own.
@@ -28,7 +29,6 @@ _BEYOND = 1.2
 # The height of a ribbon, as a part of the width of the scene.
 _HEIGHT = 0.02
 
-Corners = tuple[Floats, Floats]
 Strip = tuple[Floats, NDArray[np.int64], Floats]
 
 
@@ -65,11 +65,7 @@ class PlaneWalls:
             return []
         # Again, on a grid around this surface only.
         points = np.concatenate(found)[:, list(self._axes)]
-        low, high = points.min(axis=0), points.max(axis=0)
-        margin = 2.0 * _MARGIN * np.maximum(high - low, 0.1 * (high - low).max()) / (_POINTS - 1.0)
-        return self._of(
-            i, self._curves((np.maximum(low - margin, self._box[0]), np.minimum(high + margin, self._box[1])))
-        )
+        return self._of(i, self._curves(around(points, self._box, _POINTS)))
 
     def of_part(self, part: Part) -> list[Floats]:
         """The curves of a part of a surface where it is a wall, each end where it meets another one."""

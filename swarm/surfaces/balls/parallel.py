@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from ...common.checks import Vector
-from ...kernel.vector import Vec
+from ...kernel.jit import kernel
+from ...kernel.vector import Vec, column
 from ...state import Floats
 from ..surface import UNBOUNDED, Box, Surface, shown
 from .by_foot import ByFoot
-from .egg import distances_from
 
 # Points that are moved to where the surface is steepest least, their first step and the last one, in parts of its size.
 _STARTS, _FIRST, _SHORTEST, _SHORTER, _MOVES = 16, 0.05, 1e-6, 0.7, 3
@@ -58,6 +58,13 @@ def reach_by_distance(surface: Any, points: Floats, radius: Floats, time: float)
     found = np.empty(points.shape[1])
     distances_from(surface.walls_of_balls(0.0)[0], np.ascontiguousarray(surface._own_rows(points, time)), found)
     return found + radius
+
+
+@kernel
+def distances_from(wall, points, found):
+    """How far points (3, N) are outside of a wall, into `found`."""
+    for i in range(points.shape[1]):
+        found[i] = wall.distance(column(points, 0, i))
 
 
 def foot_of(numbers: Any, most: float, bend: float, box: Box = UNBOUNDED, known: float = math.inf) -> ByFoot:

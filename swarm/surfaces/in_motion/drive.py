@@ -126,10 +126,7 @@ class Swings(Record):
 
     def turned(self, vector_in):
         """The swings in a frame that is turned."""
-        each: tuple[Any, ...] = ()
-        for swing in self.each:
-            each = (*each, Swing(vector_in(swing.cosine), vector_in(swing.sine), swing.rate))
-        return Swings(each)
+        return Swings(tuple(Swing(vector_in(one.cosine), vector_in(one.sine), one.rate) for one in self.each))
 
     def amplitude(self):
         """Bound of |s|."""

@@ -15,11 +15,11 @@ from typing import Annotated, Any
 from ...common import checks
 from ...common.validated import Flag, Validated
 from ...errors import SceneError
-from ...kernel.gravity import as_vector
 from ...kernel.jit import select
 from ...kernel.record import Record
+from ..contract import Smooth
 from ..frames import Unturned
-from ..time_of_impact.course import Fall, Quartic, close
+from ..time_of_impact.course import Quartic
 from ..time_of_impact.rising import LevelStep
 
 # The distance at which a particle is from a wall that is not there, and the level of such a wall.
@@ -170,11 +170,7 @@ class Present(Unturned):
         # One that is not there has the level -1 for ever.
         return Quartic(self._if_there(level.c, -1.0), b, a2, a3, a4, self._if_there(level.window, math.inf))
 
-    def steps(self, gravity, r, v):
-        if gravity is None or not self.is_quartic:
-            return None
-        level = self.course(r, v, as_vector(gravity))
-        return Fall(level, close(level.window), self.may_be_far)
+    steps = Smooth.steps
 
     def moving_step(self, seen, longest):
         step = self.body.moving_step(seen, longest)

@@ -108,9 +108,7 @@ def carry_waves(walls, course, lane):
 
 def _waves(walls):
     """(the first row of a wave, its rate) of each that is kept."""
-    rates: tuple[float, ...] = ()
-    for drive in _known_drives(walls):
-        rates = (*rates, *drive.rates())
+    rates = tuple(rate for drive in _known_drives(walls) for rate in drive.rates())
     return tuple((_first_wave(walls) + k * _OF_WAVE, rate) for k, rate in enumerate(rates))
 
 
