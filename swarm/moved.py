@@ -44,7 +44,7 @@ _FOLDERS = [
     ("run", "run", "state=starting_state"),
     ("placing", "placing", "shapes=fitting_shapes"),
     ("surfaces.data", "surfaces.data", "cells=sample_cells flight=sampled_numbers numbers=sampled_numbers"),
-    ("surfaces.facets", "surfaces.facets", "cells=facet_cells room=free_room"),
+    ("surfaces.facets", "surfaces.facets", "cells=facet_cells made=members room=free_room"),
     ("surfaces.laws", "surfaces.laws", "numbers=law_numbers"),
     ("lanes", "lanes.watching", "counted_lanes counters counts crossings log"),
     ("run", "events", "balls resting windows colliding=balls_run growing=growing_run heavy=heavy_run"),

@@ -22,6 +22,7 @@ from ...kernel.vector import Vec
 from ...state import Floats, Indices
 from .. import rotation as rotations
 from ..area_samples import AreaSample, Region, of_triangles
+from ..balls.facet import triangles_of_balls
 from ..fields.members import Members
 from ..fields.one_wall import OneWall, one_wall
 from ..surface import LAWS, UNBOUNDED, Box, Surface, side_sign
@@ -29,12 +30,11 @@ from .faces import faces_of
 from .facet import OVERLAP, ROOM, THIN, CornersOf, CornersOfSides, FacetNumbers, Shared, SheetSide
 from .facet_cells import MOVING_MARGIN, cells_around
 from .flat import all_in_a_plane, in_plane, places_of, planes_of, rim_of
-from .made import given_arrays, sorted_by_place, table_of_facets, table_of_sides, triangles_of_balls, with_room
-from .members import Facets
+from .members import Facets, table_of_facets, table_of_sides, with_room
 from .mending import sizes
-from .mesh_files import read_soup
+from .mesh_files import given_arrays, read_soup
 from .nearest import boxes_of, nearest, within
-from .triangles import closed, sheets
+from .triangles import closed, sheets, sorted_by_place
 
 _NOUNS_OF_SHEETS = ("open mesh",) * 4
 # What a group may have of its own.
