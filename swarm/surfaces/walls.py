@@ -75,7 +75,7 @@ class Walls(Record):
     # For each union, for each of its rooms, for each wall of the room: 1/the steepness of its level. See rooms.py.
     unions: tuple[Any, ...] = ()
     slack: Any = None  # a distance that is round-off where rooms meet [m]
-    inset: Any = None  # where rooms touch, how far inside of its wall what meets one is put [m]
+    inset: Any = None  # where rooms touch, how far inside of a wall a particle is put that meets it [m]
 
     if TYPE_CHECKING:
 

@@ -20,7 +20,7 @@ from ..surface import Surface
 
 # A motion changes little in this part of a radian, or of a piece of a path.
 _SLOW = 0.05
-# Of an angle up to this one a^4/24 is round-off.
+# Up to this angle a, a^4/24 is round-off.
 LITTLE_ANGLE = (24.0 * EPSILON) ** 0.25
 
 

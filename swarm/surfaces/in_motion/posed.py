@@ -29,7 +29,7 @@ class Posed(Framed):
     after: float  # of the frame, at the end of the step [s]
 
     def wall(self, number):
-        """Of a field one of its walls."""
+        """One of the walls of a field."""
         return self._replace(body=self.body.wall(number))
 
     def later(self, t):

@@ -20,13 +20,13 @@ from ...state import Floats
 
 Row = tuple[float, ...]
 
-# Of the extent, what is no length of a side and no distance of two; of an angle, what is no corner.
+# A length, or a distance, up to this part of the extent counts as 0; two sides with a sine up to this have no corner.
 _NOTHING, _SMOOTH = 1e-12, 1e-9
 # Points that are looked at at once, times sides.
 _BATCH = 1 << 20
 # Points of a picture's curve along a side.
 _POINTS = 65
-# Of the distance of two sides, what is behind one of them and not the other.
+# Up to this part of the distance of two sides a place is behind the nearer one.
 _HALF = 0.4
 
 

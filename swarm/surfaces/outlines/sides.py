@@ -38,7 +38,7 @@ class Side(Unturned):
 
     holds_balls = False
 
-    # A fall is at a part of the quadric; its level alone does not say when it hits.
+    # The side is a part of the quadric, of which the level alone does not say when a fall hits it.
     is_quartic = may_be_far = in_steps = False
 
     def steps(self, gravity, r, v):

@@ -12,9 +12,9 @@ from ..in_motion.moving import Marched, Strided
 from ..surface import Surface, slopes_of
 from ..walls import Walls
 
-# Of the extent of a union, the slack of its rooms.
+# The slack of rooms, as a part of the extent of their union.
 _SLACK = 1e-13
-# Of it, how far inside what meets a wall is put where rooms touch.
+# Where rooms touch, a particle that meets a wall is put so many times the slack inside of it.
 _INSET = 3.0
 # A place is on a wall up to this distance from it, relative to the extent. Two walls touch if so many of the places on
 # one are on the other.

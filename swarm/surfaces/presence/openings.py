@@ -35,7 +35,7 @@ from .rooms import leads_on
 _MOST = 24
 # Places of a wall at which a counter is looked for in an opening, and Newton's steps onto the wall for each.
 _PLACES, _NEWTON = 4096, 8
-# A volume without end is searched as far as this many times the wall and what gives the volume extend.
+# A volume without end is searched as far as this many times the larger extent, of the wall or of the volume.
 _REACH = 2.0
 
 
