@@ -117,6 +117,9 @@ for _name in _CONSTANTS:
 class Unturned(Framed):
     """A surface in the frame of its body: each way in and out is the identity. Subclasses change what is answered."""
 
+    def flat_normal(self):
+        return self.body.flat_normal()
+
     def _same(self, given):
         return given
 

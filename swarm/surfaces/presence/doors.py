@@ -131,9 +131,6 @@ class Present(Unturned):
     # Its safe steps are taken in lanes only where its level is known as a whole.
     in_steps, has_levels, kept, aims, fall_powers, looked_at = False, False, 0, False, 0, False
 
-    def flat_normal(self):
-        return self.body.flat_normal()
-
     def _if_there(self, value, other):
         return select(self.there > 0.0, value, other)
 
