@@ -10,7 +10,7 @@ from ..kernel.gravity import potential
 from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import ZERO, column, put, square
 from ..surfaces.in_motion.moving import Carried
-from .accounts import book_step, lose
+from .accounts import book, lose
 from .carried import NOT_CARRIED, carry
 from .escape import let_out
 from .lane_arrays import booked, speed2_scale
@@ -122,7 +122,7 @@ def _step(method, walls, gravity, share, i):
     for s in range(walls.length(), impulses.shape[0]):
         given_work += 2.0 * impulses[s, 0]
     change = p.twice, end.twice_energy
-    book_step(walls, state, i, contacts.met[i], change, given_work, method.laws.loses)
+    book(walls, state, i, contacts.met[i], change, given_work, method.laws.loses, given_work)
     contacts.sliding[i] += end.used
     share.note_stay(i, end.used)
     contacts.remaining[i] = max(remaining - end.used, 0.0)
