@@ -33,7 +33,7 @@ from ..scene import Scene
 from ..state import Balls, Floats, State, none_left
 from . import energy, lists, refused
 from . import grain_arrays as arrays
-from .booking import ContactTotals, MemberCounts
+from .booking import ContactTotals
 from .drags import Drags, carry, kept_drags, room_for, set_drags
 from .exits import stored_with_others
 from .faces import Fields
@@ -126,9 +126,8 @@ class GrainsRun(BaseRun):
         )  # fmt: skip
         if laws.send_off:
             sender = Sender(
-                laws._replace(restitution=None, friction=None), RandomSource(seeding.signed(), seeding.first),
-                self._fields.places(),
-            )  # fmt: skip
+                laws._replace(restitution=None, friction=None), RandomSource(seeding.signed(), seeding.first)
+            )
             self._world = self._world._replace(sender=sender)
         if holds is not None:
             self._world = self._world._replace(held=held_of(state.mass, rubs))
@@ -408,15 +407,13 @@ class GrainsRun(BaseRun):
 
     def _watched_world(self, log: Log | None) -> World:
         """The world with the counts of members, of which another is of a run that goes on, and a log of contacts."""
-        world, places = self._world, self._fields.places
-        if world.sender is not None:
-            # Members are others where the skin has become wider than the images of a cell.
-            world = world._replace(sender=world.sender._replace(places=places()))
-        if log is not None:
-            world = world._replace(noting=Noting(log, places(), self.state.period, self._pages()))
-        if self._tally is None:
+        world, tally = self._world, self._tally
+        noting = None if log is None else Noting(log, self.state.period, self._pages())
+        world = world._replace(noting=noting, counts=None if tally is None else tally.counts())
+        if all(one is None for one in (world.sender, world.noting, world.counts)):
             return world
-        return world._replace(members=MemberCounts(self._tally.counts(), places()))
+        # Members are others where the skin has become wider than the images of a cell.
+        return world._replace(places=self._fields.places())
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         # Of the step.
