@@ -6,14 +6,14 @@ import numpy as np
 
 from ..compiled_scene import CompiledScene
 from ..contact.laws import Laws
-from ..kernel.vector import ZERO, vec
+from ..kernel.vector import vec
 from ..run.observed import Observed, observed_of
 from ..scene import Scene
 from ..state import Floats
 from ..surfaces.walls import penetration
 from .balls_run import CollidingRun
 from .colliding.heavy import COUNTS, Heavy
-from .reacting.described import freedoms_of, scenery_of, walls_now
+from .reacting.described import bring_walls, freedoms_of, scenery_of, walls_now
 from .reacting.freedoms import Freedoms, alone
 
 
@@ -64,9 +64,7 @@ class HeavyRun(CollidingRun):
         """The walls are brought to the moment in a copy: a frame is no part of their motion."""
         freedoms, since = Freedoms(*(array.copy() for array in self._freedoms)), self._since(moment)
         scenery = scenery_of(self._compiled, moment)
-        for wall in scenery.reacting:
-            wall.freedom.push(freedoms, since, ZERO, ZERO)
-        freedoms.time.fill(0.0)
+        bring_walls(scenery, freedoms, since)
         self._observed = observed_of(self._scene, freedoms, moment)
         return walls_now(self._compiled, scenery, freedoms)
 

@@ -217,17 +217,14 @@ class GrainsRun(BaseRun):
         self._world = self._world._replace(grains=arrays.beside(grains, self._rows_of(born.number)))
         near = self._world.near
         self._make_room(near.mate.size, near.slot.size)
-        self._list_with(kept)
+        self._list(kept)
 
     # --- Lists ---------------------------------------------------------------------------------------------
 
-    def _list(self) -> None:
-        """List anew what is near, where all are now."""
-        self._list_with(kept_drags(self._tier.kernel, self._world))
-
-    def _list_with(self, kept: Drags | None) -> None:
-        """The same, with these impulses of friction of before."""
+    def _list(self, kept: Drags | None = None) -> None:
+        """List anew what is near, where all are now; with what was kept of contacts, if lists have changed since."""
         matter, clock, kernel = self._matter, self._clock, self._tier.kernel
+        kept = kept_drags(kernel, self._world) if kept is None else kept
         self._wrap()
         self._drop_gone()
         grains, near = self._world.grains, self._world.near
@@ -256,7 +253,7 @@ class GrainsRun(BaseRun):
         lost += stored_with_others(self._matter, world, gone)
         self.state.dissipated[world.grains.number] += lost
         # There it stays.
-        self._tier.kernel(energy.show)(world.grains, self.state, world.held)
+        energy.show(world.grains, self.state, world.held)
         stay = {name: aligned_copy(rows[~gone]) for name, rows in world.grains._asdict().items() if rows is not None}
         rest, near = world.grains._replace(**stay), world.near
         members = None if near.listed is None else near.listed.size
@@ -438,11 +435,10 @@ class GrainsRun(BaseRun):
         if self._instants is not None or matter.openings is not None:
             into = self.state.dissipated
             yield energy.store_at_walls, (matter, self._walls, 0.0, world.grains, world.near, into)
-        yield energy.show, (world.grains, self.state, world.held)
         yield observables.observe, self._observing()
 
     def _show(self, moment: float) -> None:
-        self._tier.kernel(energy.show)(self._world.grains, self.state, self._world.held)
+        energy.show(self._world.grains, self.state, self._world.held)
         if self._heavy is not None:
             self._observed = observed_of(self._scene, motion_of(self._heavy), moment)
         image, position = self.state.image, self.state.position

@@ -35,15 +35,10 @@ def held_of(mass: Any, rubs: bool) -> Held:
     return Held(np.full(n, math.nan), np.zeros((3, n)), np.zeros((3, n)) if rubs else None, mass)
 
 
-def is_held(held, one):
-    """Whether a particle is held."""
-    return False if held is None else held.until[one] == held.until[one]
-
-
 def velocity_of(held, grains, i):
     """The velocity of a ball, or that with which it leaves."""
     one = index(grains.number[i])
-    if is_held(held, one):
+    if held is not None and held.until[one] == held.until[one]:
         return Vec(held.velocity[0, one], held.velocity[1, one], held.velocity[2, one])
     return vector_at(grains.speed, i, col.BEFORE)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...compiled_scene import REACTING, CompiledScene
 from ...contact.laws import NONE, Laws
-from ...kernel.vector import Vec, vec
+from ...kernel.vector import ZERO, Vec, vec
 from ...motion import Guide, Rotation, speed_at_start, unit_axis
 from ...scene import Scene
 from ...state import Floats
@@ -127,6 +127,13 @@ def freedoms_of(compiled: CompiledScene, velocity: Floats) -> Freedoms:
         if isinstance(wall.freedom, Pendulum):
             wall.freedom.expand(made)
     return made
+
+
+def bring_walls(scenery: SceneWalls, freedoms: Freedoms, t: float) -> None:
+    """Bring the walls to a time, from which their motions are counted then."""
+    for wall in scenery.reacting:
+        wall.freedom.push(freedoms, t, ZERO, ZERO)
+    freedoms.time.fill(0.0)
 
 
 def walls_now(compiled: CompiledScene, scenery: SceneWalls, freedoms: Freedoms) -> Walls:
