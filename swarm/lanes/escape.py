@@ -47,14 +47,6 @@ def detain(share, p, wall, remaining, wait):
     return False
 
 
-def meet_openings(openings, method, walls, gravity, share, lanes, live):
-    """Handle the lanes that are at openings at the end of their flights."""
-    if method.steps_into_walls:
-        face_lanes(openings, method, walls, gravity, share, lanes, live)
-    else:
-        let_out_lanes(openings, method, walls, gravity, share, lanes, live)
-
-
 def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
     """Let lanes out that have flown to a wall where it is open, if no closed wall is at the same place.
 
