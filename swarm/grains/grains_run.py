@@ -330,13 +330,6 @@ class GrainsRun(BaseRun):
             require_free(self._scene_now(), self._seen_state(), came, deepest, instant, self._first)
         self._stored_before = self._stored_at(self._walls_of(self._compiled, instant, float(self._clock[SKIN])), 0.0)
 
-    def _switch_walls(self, span: float) -> None:
-        """Lose what contacts stored with walls that went at the instant, by the walls of the piece that begins [s]."""
-        if self._stored_before is not None:
-            self._list()
-            self.state.dissipated[:] += self._stored_before - self._stored_at(self._walls, span)
-            self._stored_before = None
-
     def _stored_at(self, walls: Any, remaining: float) -> NDArray[np.float64]:
         """What the contacts of each ball with walls store when so much of the frame is left [s], (N,) [J]."""
         world, found = self._world, np.zeros(len(self.state.mass))
@@ -371,7 +364,11 @@ class GrainsRun(BaseRun):
         if not self._cut_short:
             self._clock[DONE] = 0.0
         if self._instants is not None:
-            self._switch_walls(span)
+            if self._stored_before is not None:
+                # What contacts stored with walls that went at the instant is lost.
+                self._list()
+                self.state.dissipated[:] += self._stored_before - self._stored_at(self._walls, span)
+                self._stored_before = None
             if not self._cut_short and self._fields.any_moves():
                 # How long ago they were listed is known in steps.
                 self._list()

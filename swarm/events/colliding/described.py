@@ -137,11 +137,9 @@ def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Fl
     kinds = kinds_of(particles, laws.may_wait)
     if laws.may_wait:
         flock = flock._replace(holds=1.0)
-    made = Domain(walls, laws, scene.pull(), grid, kinds, loss, shortest)
-    made = made._replace(turning=turning)
-    if scene.gravity is not None:
-        # Also where nothing is lost: balls may start at rest on a floor.
-        made = made._replace(repose=repose_of(math.hypot(*scene.gravity), particles.radius))
+    # Also where nothing is lost: balls may start at rest on a floor.
+    repose = None if scene.gravity is None else repose_of(math.hypot(*scene.gravity), particles.radius)
+    made = Domain(walls, laws, scene.pull(), grid, kinds, loss, shortest, repose=repose, turning=turning)
     return made, flock, epoch
 
 
