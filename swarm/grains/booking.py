@@ -8,11 +8,11 @@ from ..contact.wall_impact import give_work
 from ..kernel.arrays import index, unwritten
 from ..kernel.jit import Array, outlined
 from ..kernel.lines import LANES
-from ..kernel.vector import dot, norm
+from ..kernel.vector import column, dot, norm
 from . import grain_arrays as col
 from .at_walls import step_at_wall
 from .contacts import closing, worse
-from .grain_arrays import set_vector, vector_at, vector_in
+from .grain_arrays import set_vector, vector_at
 from .heavy_walls import is_heavy
 from .lanes_of_pairs import (
     balls_of,
@@ -64,14 +64,14 @@ _VIRIAL, _END, _LOST, _BOOKED = 0, 1, 2, 3
 
 def _weigh(matter, rows, q, lane, read, booked, notes):
     """Compute what is booked of a contact."""
-    s0, impulse = vector_in(rows, q + col.START, lane), vector_in(rows, q + col.IMPULSE, lane)
+    s0, impulse = column(rows, q + col.START, lane), column(rows, q + col.IMPULSE, lane)
     move = move_in(matter, rows, q, lane, slip_in(read, _SLIP, lane))
     gap, way, lost = rows[q + col.GAP, lane], closing(s0, rows[q + col.SIZE, lane], move), 0.0
     booked[_VIRIAL, lane], booked[_END, lane] = dot(s0 + 0.5 * move, impulse), gap + way.change
     if matter.pairs.damping is not None:
         lost = _lost(matter, dot(impulse, move), gap, way.change)
     if matter.pairs.friction is not None:
-        gained = dot(vector_in(rows, q + col.DRAG, lane), move) / matter.h
+        gained = dot(column(rows, q + col.DRAG, lane), move) / matter.h
         lines = _SPINS, _SPINS + col.COLUMNS_OF_BALLS
         turned = turning_in(read, *lines, col.BEFORE, lane) + turning_in(read, *lines, col.AFTER, lane)
         gained = gained - 0.5 * dot(twist_in(rows, q, lane, move), turned)
@@ -116,7 +116,7 @@ def book_pairs(matter, grains, near, touches, books, notes):
             _enter(matter, books, rows, q, lane, (index(number[i]), index(number[j])), booked)
             if matter.pairs.friction is not None:
                 listed = index(ends[e + col.PLACE, lane])
-                set_vector(near.drag, listed, 0, vector_in(rows, q + col.DRAG, lane))
+                set_vector(near.drag, listed, 0, column(rows, q + col.DRAG, lane))
     books.virial[0] += virial
     return deepest
 
