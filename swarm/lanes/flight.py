@@ -165,20 +165,13 @@ def aims(walls, gravity):
 
 def _stride(walls, gravity, lanes, live):
     """Safe steps of all lanes to walls in any motion."""
-    course = lanes.course
     if aims(walls, gravity):
         _stride_open(walls, gravity, lanes, _aim_at_moving(walls, gravity, lanes, live))
         return
-    for i in range(index(live)):
-        lane = lanes.lane(i)
-        strides.start(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
-    for i in range(index(live)):
-        lane = lanes.lane(i)
-        strides.stride(walls, gravity, course, i, lane.r, lane.v, lane.remaining, True)
+    _of_flights(strides.start, walls, gravity, lanes, live)
+    _of_flights(strides.stride, walls, gravity, lanes, live, True)
     for _round in range(_STRIDES):
-        for i in range(index(live)):
-            lane = lanes.lane(i)
-            strides.stride(walls, gravity, course, i, lane.r, lane.v, lane.remaining, False)
+        _of_flights(strides.stride, walls, gravity, lanes, live, False)
 
 
 def _aim_at_moving(walls, gravity, lanes, live):
@@ -214,7 +207,7 @@ def _aim_at_moving(walls, gravity, lanes, live):
 
 
 def _of_flights(ask, walls, gravity, lanes, live, *given):
-    """Ask of the flight of every lane what `aim` does."""
+    """Ask something of the flight of every lane."""
     for i in range(index(live)):
         lane = lanes.lane(i)
         ask(walls, gravity, lanes.course, i, lane.r, lane.v, lane.remaining, *given)
