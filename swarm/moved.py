@@ -76,7 +76,7 @@ _FOLDERS = [
     ("kernel.trace", "kernel.trace", "expressions=twins"),
     ("surfaces", "surfaces", "polyhedron=room"),
     ("triangles", "triangles", "given=sharp"),
-    ("events", "events.colliding", "resting"),
+    ("events", "events.colliding", "resting windows=window"),
     ("events.colliding", "events", "growing=growing_run"),
     ("events.colliding", "events.colliding", "ahead=events"),
     ("pictures", "pictures", "silhouette=scenery"),

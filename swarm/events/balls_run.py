@@ -33,8 +33,7 @@ from .colliding.next_collision import FIXED
 from .colliding.queue import FIRST
 from .colliding.resting import warn_of_rest
 from .colliding.rows import FACE, MET, WHOLES
-from .colliding.window import END
-from .windows import windows_of
+from .colliding.window import END, windows_of
 
 
 class CollidingRun(BaseRun):
