@@ -215,30 +215,26 @@ class GrainsRun(BaseRun):
             sides = crossed_of(self._matter.counters, self._counted, self._scene, born.position).side
             state.crossed.side[:, born.number] = sides
         self._world = self._world._replace(grains=arrays.beside(grains, self._rows_of(born.number)))
-        near = self._world.near
-        self._make_room(near.mate.size, near.slot.size)
+        self._make_room()
         self._list(kept)
 
     # --- Lists ---------------------------------------------------------------------------------------------
 
     def _list(self, kept: Drags | None = None) -> None:
         """List anew what is near, where all are now; with what was kept of contacts, if lists have changed since."""
-        matter, clock, kernel = self._matter, self._clock, self._tier.kernel
+        clock, kernel = self._clock, self._tier.kernel
         kept = kept_drags(kernel, self._world) if kept is None else kept
         self._wrap()
         self._drop_gone()
-        grains, near = self._world.grains, self._world.near
-        if near.wall_is_open is not None:
-            near.wall_is_open[:] = False
-        skin = float(clock[SKIN])
+        grains, skin = self._world.grains, float(clock[SKIN])
+        if self._world.near.wall_is_open is not None:
+            self._world.near.wall_is_open[:] = False
         reach = 2.0 * float(grains.place[:, arrays.RADIUS].max(initial=0.0)) + skin
-        cells, order = lists.cells_of(grains.place[:, X : X + 3], reach, matter.period)
+        cells, order = lists.cells_of(grains.place[:, X : X + 3], reach, self._matter.period)
         for rows in (grains.number, grains.place, grains.speed, grains.change, grains.spin):
             if rows is not None:
                 rows[:] = rows.take(order, axis=0)
-        while (pairs := kernel(lists.list_pairs)(matter.period, grains, near, cells, skin)) > near.mate.size:
-            near = self._make_room(pairs, near.slot.size)
-        self._list_walls(kernel, near, skin)
+        self._list_near(cells, skin)
         if self._heavy is not None:
             self._heavy.listed[:, :3] = self._heavy.place[:, X : X + 3]
         set_drags(kernel, self._world, kept)
@@ -255,26 +251,26 @@ class GrainsRun(BaseRun):
         # There it stays.
         energy.show(world.grains, self.state, world.held)
         stay = {name: aligned_copy(rows[~gone]) for name, rows in world.grains._asdict().items() if rows is not None}
-        rest, near = world.grains._replace(**stay), world.near
-        members = None if near.listed is None else near.listed.size
-        near, touches = self._room(len(rest.number), near.mate.size, near.slot.size, members)
-        self._world = world._replace(grains=rest, near=near, touches=touches)
+        self._world = world._replace(grains=world.grains._replace(**stay))
+        self._make_room()
 
     def _left(self) -> float:
         """What is left of the frame, or of the piece of one, under way [s]."""
         return (self._steps_in(self._span) - float(self._clock[DONE])) * self._matter.h
 
-    def _list_walls(self, kernel: Any, near: arrays.Neighbours, skin: float) -> None:
-        """List what of the walls is near."""
+    def _list_near(self, cells: lists.CellOrder, skin: float) -> None:
+        """List what is near, of balls and of walls, with as much room as that takes."""
+        kernel, grains, left = self._tier.kernel, self._world.grains, self._left()
         if self._fields.reaches(skin):
             self._walls = self._walls_of(self._compiled, self._moment, skin)
-        faces, grains = self._fields.faces, self._world.grains
         while True:
-            at = kernel(lists.list_walls)(self._walls, faces, grains, near, skin, self._left())
-            members = 0 if near.used is None else int(near.used[0])
-            if at <= near.slot.size and (near.listed is None or members <= near.listed.size):
+            near = self._world.near
+            pairs = kernel(lists.list_pairs)(self._matter.period, grains, near, cells, skin)
+            touching = kernel(lists.list_walls)(self._walls, self._fields.faces, grains, near, skin, left)
+            found = pairs, touching, 0 if near.used is None else int(near.used[0])
+            if all(need <= have for need, have in zip(found, _sizes(near), strict=True)):
                 return
-            near = self._make_room(near.mate.size, at, members)
+            self._make_room(*found)
 
     def _wrap(self) -> None:
         """Bring all into the cell that repeats."""
@@ -296,20 +292,13 @@ class GrainsRun(BaseRun):
         near = arrays.near_of(n, walls, pairs, touching, kept, members, matter.openings is not None)
         return near, arrays.touches_of(n, walls, pairs, touching, near.listed)
 
-    def _make_room(self, pairs: int, touching: int, members: int = 0) -> arrays.Neighbours:
-        """Make room for so many pairs, balls at walls, and members of fields, and some more."""
-        near = self._world.near
-        have = 0 if near.listed is None else near.listed.size
-        wanted = (pairs, near.mate.size), (touching, near.slot.size), (members, have)
+    def _make_room(self, *found: int) -> None:
+        """Room for the balls of now in lists that hold nothing: as much as there was, and more than was `found`."""
+        near, wanted = self._world.near, zip(found or (0, 0, 0), _sizes(self._world.near), strict=True)
         pairs, touching, members = (have if need <= have else int(_MORE * need) for need, have in wanted)
-        made, touches = self._room(
-            len(self._world.grains.number), pairs, touching, None if near.listed is None else members
-        )
-        for old, new in zip(near, made, strict=True):
-            if old is not None:
-                new[: len(old)] = old
-        self._world = self._world._replace(near=made, touches=touches)
-        return made
+        number = self._world.grains.number
+        near, touches = self._room(len(number), pairs, touching, None if near.listed is None else members)
+        self._world = self._world._replace(near=near, touches=touches)
 
     def _list_again(self) -> None:
         """List anew in a step, with a wider skin where the lists do not even hold for one."""
@@ -507,3 +496,8 @@ class GrainsRun(BaseRun):
         self._world = self._world._replace(near=near, touches=touches)
         super().restore(arrays, cut_short)
         self._show(self._moment)
+
+
+def _sizes(near: arrays.Neighbours) -> tuple[int, int, int]:
+    """The room for pairs, for balls at walls, and for members of fields."""
+    return near.mate.size, near.slot.size, 0 if near.listed is None else near.listed.size
