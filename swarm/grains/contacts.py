@@ -124,11 +124,11 @@ def begin_solve(pressed_first, ease):
 
 
 def scale_of(matter, push, speeds, ease):
-    """What makes the magnitude of a change of an impulse one relative to what moves there, and what weight does.
+    """A factor: the magnitude of a change of an impulse times it is relative to what moves at the contact and falls.
 
-    With what the solution begins: the size of the impulse, and `speeds`, the magnitude of the relative velocity and the
-    sum of those of both. What counts is the former, by which balls that are carried along are solved as at rest; less
-    than round-off of the latter is not asked for.
+    What moves is taken as the solution begins: the size of the impulse, and `speeds`, the relative speed and the sum of
+    both speeds. The relative speed counts, so that balls that are carried along are solved as at rest, but no less than
+    the round-off of the sum.
     """
     fall = 0.0 if matter.pull is None else matter.h * size_of(matter.pull)
     relative, whole = speeds
@@ -292,7 +292,7 @@ def _find_missed(matter, grains, near, touches):
 
 
 class Travel(Record):
-    """How far balls are at the end of a step from where they were to be, from where they were listed, and moved."""
+    """How far balls are, at the end of a step, from where they were foreseen and listed, and how far they moved."""
 
     off_course: Any  # with the last step's change, at most [m]
     from_list: Any  # their squares, at most [m^2]

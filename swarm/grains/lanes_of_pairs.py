@@ -1,10 +1,11 @@
 """The contacts of pairs in groups, each in a lane: one after the other takes three times as long.
 
-They are slices of some parts, and a group has one contact of each part of a slice: its balls are far from one another,
-but what is read of them is in the second cache. The numbers of a group are beside one another, by columns, and LLVM
-makes vectors of them: what is computed for a group is a loop over its lanes that reads what balls have, one without a
-branch, and one that writes to balls, which may be the same ones. Sweeps go over all groups; where two of a group share
-a ball it goes in parts: so each contact begins with what the ones before have led to.
+Contacts are cut into slices, a slice into as many parts as a group has lanes, and a group has one contact of each part:
+so its balls are far from one another, and what is read of them is in the second cache. The numbers of a group are
+beside one another, by columns, and LLVM makes vectors of them. A group is computed in three loops over its lanes: one
+reads from balls, one computes without a branch, and one writes to balls, which may be the same ones. Sweeps go over all
+groups. A group of which two contacts share a ball goes in parts: so each contact begins with what those before it have
+led to.
 """
 
 import math

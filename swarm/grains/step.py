@@ -71,7 +71,7 @@ _STALLED, _STALLED_RUBS, _BETTER, _LEAST_SHARE = 20, 100, 0.7, 1.0 / 64.0
 
 
 class MarchRule(NamedTuple):
-    """The length of the frame in steps, before which of them to stop, and after how many; the end of the frame [s]."""
+    """How many steps a frame has, the one to stop before, after how many to halt, and the end of the frame [s]."""
 
     span: float
     stop: float

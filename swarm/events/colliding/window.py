@@ -94,7 +94,7 @@ class Windows:
         return bool(self.numbers[END] == self._clock[LENGTH])
 
     def instant(self) -> float | None:
-        """The instant at which the window ends [s], if that is why it does."""
+        """The instant at which the window ends [s]; None if it ends with the epoch."""
         passed = int(self.numbers[PASSED])
         return self._instants[passed - 1] if passed and self._instants[passed - 1] == self.numbers[MOMENT] else None
 
