@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from ..compiled_scene import CompiledScene
-from ..contact.laws import Laws
 from ..kernel.vector import vec
 from ..run.observed import Observed, observed_of
 from ..scene import Scene
@@ -28,9 +27,6 @@ class HeavyRun(CollidingRun):
         walls = [wall.grown(radius) for wall in self._heavy.walls]
         return all(penetration(alone(wall.freedom.posed(wall.body, self._freedoms, now)), r) <= 0.0 for wall in walls)
 
-    def _every_laws(self, compiled: CompiledScene, box: Any) -> list[Laws]:
-        return scenery_of(compiled, 0.0).each_laws()
-
     def _with_heavy(self, compiled: CompiledScene, box: Any) -> Any:
         state = self.state
         n = state.mass.size
@@ -47,7 +43,7 @@ class HeavyRun(CollidingRun):
 
     def _set_window(self) -> None:
         if self._windows is not None:
-            self._heavy = self._heavy._replace(walls=self._windows.reacting())
+            self._heavy = self._heavy._replace(walls=self._windows.scenery().reacting)
             self._box = self._box._replace(heavy=self._heavy)
         super()._set_window()
 

@@ -18,6 +18,7 @@ from ...surfaces.time_of_impact import flights, safe
 from ...surfaces.time_of_impact.flights import Hit
 from ...surfaces.time_of_impact.rising import flight_of
 from ..reacting.described import scenery_of
+from ..reacting.queue import SceneWalls
 from .clock import EPOCHS, LENGTH
 from .rows import FLOATS, LEAVES
 
@@ -109,20 +110,9 @@ class Windows:
             passed += 1
         self.numbers[:] = end, end - now, passed, moment
 
-    def walls(self) -> Any:
-        """The walls as kernels take them in this window."""
-        moment = float(self.numbers[MOMENT])
-        compiled = self._compiled
-        return scenery_of(compiled, moment).given if compiled.scene.reacts() else compiled.walls(moment)
-
-    def openings(self) -> Any:
-        """The openings in it of the walls that have no mass."""
-        moment, compiled = float(self.numbers[MOMENT]), self._compiled
-        return scenery_of(compiled, moment).openings if compiled.scene.reacts() else compiled.openings(moment)
-
-    def reacting(self) -> Any:
-        """The walls in it that have a mass."""
-        return scenery_of(self._compiled, float(self.numbers[MOMENT])).reacting
+    def scenery(self) -> SceneWalls:
+        """The walls in this window, those that have no mass and those that have one."""
+        return scenery_of(self._compiled, float(self.numbers[MOMENT]))
 
 
 def windows_of(compiled: CompiledScene, clock: Floats) -> Windows | None:

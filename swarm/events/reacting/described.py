@@ -23,8 +23,9 @@ from .strikes import Reacting
 
 def scenery_of(compiled: CompiledScene, moment: float) -> SceneWalls:
     """The walls of a scene in the frame that ends at a moment [s]."""
-    scene, given = compiled.scene, compiled.of_no_mass
-    reacts, numbering = np.array([surface.reacts() for surface in scene.surfaces]), compiled.numbering
+    scene = compiled.scene
+    given = compiled.of_no_mass if scene.reacts() else compiled
+    reacts, numbering = np.array([surface.reacts() for surface in scene.surfaces], bool), compiled.numbering
     stay = np.flatnonzero(~reacts[numbering.members[0]])
     return SceneWalls(
         Walls(()) if given is None else given.walls(moment),
