@@ -26,13 +26,15 @@ from ..files import marks, paths
 from ..methods.base import Method
 from ..observables import CHUNK
 from ..particles import ARRAYS, Births, Particles
-from ..run.machine import RunEnd
 from ..run.options import RunOptions, Task
+from ..run.result import Result
 from ..run.tally import scales_of
-from ..state import Absorbed, Multipliers
+from ..state import Multipliers
 from . import sent_modules
 
 _BIRTHS = ("birth_time", "birth_source")
+# Arrays of a result: times that are left out where no particle has one, and others.
+_TIMES, _ENDS = ("escape_time", "absorbed_time"), ("impacts_per_particle", "birth_time", "collisions_per_particle")
 
 
 class Whole(NamedTuple):
@@ -175,29 +177,24 @@ def task_of(folder: Path, k: int) -> Task:
     return Task(whole.compiled, particles, whole.method, options, bodies, first, *of_all)
 
 
-def write_end(path: Path, end: RunEnd) -> None:
+def write_end(path: Path, end: Result) -> None:
     """Write how a shard ended."""
-    arrays: dict[str, Any] = {"position": end.particles.position, "velocity": end.particles.velocity}
-    arrays["impacts"] = end.impacts
-    if not np.isnan(end.escape_time).all():
-        arrays["escape_time"] = end.escape_time
-    if end.absorbed is not None:
-        arrays |= {f"absorbed.{name}": array for name, array in end.absorbed._asdict().items()}
-    own = {"image": end.particles.image, "spin": end.particles.spin, "collisions": end.collisions}
-    own["birth_time"] = end.birth_time
-    arrays |= {name: array for name, array in own.items() if array is not None}
-    if end.multipliers is not None:
-        arrays |= {f"multipliers.{name}": array for name, array in end.multipliers._asdict().items()}
+    particles, multipliers = end.particles, end.multipliers
+    arrays = {name: getattr(particles, name) for name in ("position", "velocity", "image", "spin")}
+    arrays |= {name: getattr(end, name) for name in _ENDS}
+    arrays |= {name: times for name in _TIMES if not np.isnan(times := getattr(end, name)).all()}
+    arrays |= {} if multipliers is None else {f"multipliers.{k}": rows for k, rows in multipliers._asdict().items()}
+    arrays = {name: array for name, array in arrays.items() if array is not None}
     _replace(path, functools.partial(_save, np.array(list(arrays)), *arrays.values()))
 
 
 # --- What the client reads ------------------------------------------------------------------------------
 
 
-def joined_end(folder: Path, task: Task, bounds: list[int]) -> RunEnd:
+def joined_end(folder: Path, task: Task, bounds: list[int]) -> Result:
     """The end of all shards; without observables and wall time."""
     n = bounds[-1]
-    whole: dict[str, NDArray[Any]] = {"escape_time": np.full((len(task.particles) // n, n), np.nan)}
+    whole: dict[str, NDArray[Any]] = {name: np.full((len(task.particles) // n, n), np.nan) for name in _TIMES}
     for k, (first, last) in enumerate(itertools.pairwise(bounds)):
         with open(end_of(folder, k), "rb") as file:
             for name in np.load(file).tolist():
@@ -212,8 +209,14 @@ def joined_end(folder: Path, task: Task, bounds: list[int]) -> RunEnd:
     particles.position, particles.velocity, particles.image = flat["position"], flat["velocity"], flat.get("image")
     particles.spin = flat.get("spin")
     loops = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("multipliers.")}
-    gone = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("absorbed.")}
-    return RunEnd(
-        particles, {}, 0.0, Multipliers(**loops) if loops else None, flat["impacts"], flat["escape_time"],
-        Absorbed(**gone) if gone else None, flat["birth_time"], flat.get("collisions"),
-    )  # fmt: skip
+    return Result(
+        particles,
+        {},
+        0.0,
+        task.options.trajectory,
+        Multipliers(**loops) if loops else None,
+        bodies=None if task.bodies is None else task.bodies.moved(particles),  # type: ignore[arg-type]
+        scene=task.scene,
+        method=task.method,
+        **{name: flat.get(name) for name in (*_TIMES, *_ENDS)},  # type: ignore[arg-type]
+    )
