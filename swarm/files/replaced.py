@@ -19,15 +19,14 @@ def no_room(path: Path | None, room: int = _BLOCK) -> str:
     """What the system says if so many bytes more cannot be written to a file, which libraries do not tell; else ""."""
     if path is None:
         return ""
-    size = path.stat().st_size if path.exists() else 0
     try:
-        try:
-            with open(path, "ab", buffering=0) as file:
-                left = room
+        with open(path, "ab", buffering=0) as file:
+            size, left = file.tell(), room
+            try:
                 while left > 0:  # the first write may be in part
                     left -= file.write(bytes(min(left, _BLOCK)))
-        finally:
-            os.truncate(path, size)
+            finally:
+                file.truncate(size)
     except OSError as error:
         return cause(error)
     return ""

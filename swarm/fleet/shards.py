@@ -8,12 +8,9 @@ needs nothing from the client, and the scheduler carries short messages only.
 """
 
 import dataclasses
-import functools
 import itertools
-import os
-from collections.abc import Callable
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +20,7 @@ from ..bodies.copies import Bodies
 from ..compiled_scene import CompiledScene
 from ..errors import SceneError
 from ..files import marks, paths
+from ..files.replaced import replaced
 from ..methods.base import Method
 from ..observables import CHUNK
 from ..particles import ARRAYS, Births, Particles
@@ -85,29 +83,14 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     births, volume = task.particles.births, task.particles.volume
     balls = () if births is None else births.balls
     whole = Whole(task.compiled, task.method, options, body, bounds, start, scales_of(task), volume, balls)
-    _replace(folder / "whole.pickle", lambda file: cloudpickle.dump(whole, file))
-    for name in ARRAYS:
-        array = getattr(task.particles, name)
-        if array is not None and not (name == "mass" and body):
-            _replace(folder / f"{name}.npy", functools.partial(_save, array))
-    if births is not None:
-        for name, array in zip(_BIRTHS, births, strict=False):
-            _replace(folder / f"{name}.npy", functools.partial(_save, array))
-
-
-def _save(*arrays_and_file: Any) -> None:
-    """Write arrays one behind the other: an archive of NumPy has checksums, which take three times as long."""
-    *arrays, file = arrays_and_file
-    for array in arrays:
-        np.save(file, array)
-
-
-def _replace(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
-    """Write a file that is there as a whole or not at all."""
-    part = paths.part_of(path)
-    with open(part, "wb") as file:
-        write(file)
-    os.replace(part, path)
+    with replaced(folder / "whole.pickle", "description of the shards") as file:
+        cloudpickle.dump(whole, file)
+    arrays = {name: getattr(task.particles, name) for name in ARRAYS if not (name == "mass" and body)}
+    arrays |= {} if births is None else dict(zip(_BIRTHS, births, strict=False))
+    for name, array in arrays.items():
+        if array is not None:
+            with replaced(folder / f"{name}.npy", "start of the shards") as file:
+                np.save(file, array)
 
 
 def clear(folder: Path) -> None:
@@ -185,7 +168,10 @@ def write_end(path: Path, end: Result) -> None:
     arrays |= {name: times for name in _TIMES if not np.isnan(times := getattr(end, name)).all()}
     arrays |= {} if multipliers is None else {f"multipliers.{k}": rows for k, rows in multipliers._asdict().items()}
     arrays = {name: array for name, array in arrays.items() if array is not None}
-    _replace(path, functools.partial(_save, np.array(list(arrays)), *arrays.values()))
+    # One behind the other: an archive of NumPy has checksums, which take three times as long.
+    with replaced(path, "end of a shard") as file:
+        for array in (np.array(list(arrays)), *arrays.values()):
+            np.save(file, array)
 
 
 # --- What the client reads ------------------------------------------------------------------------------
