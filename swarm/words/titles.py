@@ -12,7 +12,7 @@ from ..scene import Scene
 from ..surfaces.surface import Surface
 from ..surfaces.union import part_at
 from . import nouns
-from .amounts import amount, amounts, counted_in_words, listed, many, one, plural_of
+from .amounts import amount, amounts, counted, counted_in_words, listed, many, one
 
 # Most letters of a title.
 LONGEST = 90
@@ -110,10 +110,6 @@ def _laws(scene: Scene) -> str:
 # --- What runs -------------------------------------------------------------------------------------------
 
 
-def _so_many(count: int, noun: str) -> str:
-    return f"1 {noun}" if count == 1 else f"{many(count)} {plural_of(noun)}"
-
-
 def of_particles(content: Any) -> str:
     """What runs: so many particles, balls or bodies.
 
@@ -121,13 +117,8 @@ def of_particles(content: Any) -> str:
     """
     count, body, radius = count_of(content), content.body, _radius(content)
     if body is not None:
-        copies = count // len(body)
-        noun = noun_of_body(body)
-        return _so_many(copies, noun)
-    noun = "particle"
-    if radius is not None:
-        noun = "ball" if content.scene.plane is None else "disc"
-    text = _so_many(count, noun)
+        return counted(count // len(body), noun_of_body(body))
+    text = counted(count, "particle" if radius is None else "ball" if content.scene.plane is None else "disc")
     if radius is not None and len(radius):
         low, high = float(np.nanmin(radius)), float(np.nanmax(radius))
         size = amount(low, "m") if low == high else amounts([low, high], "m").replace(" and ", " to ")
