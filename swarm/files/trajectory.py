@@ -496,7 +496,7 @@ class Trajectory(Stored):
             SceneError: an argument is out of its range, the trajectory is damaged or holds no frame, or matplotlib or
                 scikit-image is not installed.
         """
-        return cast("Figure", view("plot").figure_of_trajectory(self, figsize, particles))
+        return cast("Figure", view("plot").figure_of(view("content").content_of(self), figsize, particles))
 
     def animate(
         self,
