@@ -175,8 +175,7 @@ def _of_body(body: Body | None) -> list[Statement]:
         "point": body, "link": body.links, "spring": body.springs, "elastic edge": edges, "anchor": body.anchors,
         "guide": body.guides, "cavity": body.cavities,
     }  # fmt: skip
-    counted = [counted(len(some), name) for name, some in parts.items() if len(some)]
-    return [Statement("body", ", ".join(counted))]
+    return [Statement("body", ", ".join(counted(len(some), name) for name, some in parts.items() if len(some)))]
 
 
 def _packing(content: Content) -> list[Statement]:
