@@ -66,7 +66,7 @@ def checked_target(path: Any, overwrite: bool, sources: tuple[Path, ...]) -> Pat
     target = paths.target_of("report", path)
     if target.suffix.lower() not in _SUFFIXES:
         raise SceneError(f"report: expected a file name that ends in .html, got {target}")
-    paths.check_distinct({"report": target}, dict.fromkeys(("file that it is of", "file"), None) | _named(sources))
+    paths.check_distinct({"report": target}, {f"{source.name} that it is of": source for source in sources})
     marks.check_target(target, overwrite, "report")
     return target
 
@@ -80,10 +80,6 @@ def written(made: Callable[[], Page], path: Any, overwrite: bool, sources: tuple
     if path is not None:
         page.save(path, overwrite=overwrite)
     return page
-
-
-def _named(sources: tuple[Path, ...]) -> dict[str, Path | None]:
-    return {f"{source.name} that it is of": source for source in sources}
 
 
 def filled(template: str, **content: Any) -> str:
