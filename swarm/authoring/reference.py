@@ -6,10 +6,11 @@ The pages are plain HTML with one script, which searches in `search.js`: they wo
 
 import html
 import inspect
+import itertools
 import json
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -29,22 +30,6 @@ _HERE, _PACKAGE = Path(__file__).parent, sys.modules[__package__.partition(".")[
 _TOPIC = re.compile(r"(?m)^ {4}(\S[\w ]*?) {2,}(.*(?:\n {10,}.*)*)")
 _SECTIONS = ("Returns", "Raises", "Conserves", "Order", "Cost", "Source", "Reference")
 _WITH_ENTRIES = ("Args", "Attributes", "Raises")
-
-
-class Command(NamedTuple):
-    """A command of the command line.
-
-    Attributes:
-        name: as it is typed, behind swarm.
-        about: what it does.
-        options: for each argument or option its names, its default, and what it is.
-        example: or "".
-    """
-
-    name: str
-    about: str
-    options: tuple[tuple[str, str, str], ...]
-    example: str
 
 
 class Entry(NamedTuple):
@@ -81,8 +66,8 @@ def topics() -> dict[str, list[str]]:
     return {title: re.findall(r"\w+", names) for title, names in _TOPIC.findall(text)}
 
 
-def write(folder: Path, commands: tuple[Command, ...], overwrite: bool = False) -> Path:
-    """Write the pages into a folder, which is made, and return the first page.
+def write(folder: Path, commands: Mapping[str, Any], overwrite: bool = False) -> Path:
+    """Write the pages into a folder, which is made, and return the first page; `commands` are those of click.
 
     Raises:
         SceneError: the folder is a file, or holds a page that may not be replaced.
@@ -104,7 +89,7 @@ def write(folder: Path, commands: tuple[Command, ...], overwrite: bool = False) 
     return target / "index.html"
 
 
-def sections(commands: tuple[Command, ...]) -> tuple[Section, ...]:
+def sections(commands: Mapping[str, Any]) -> tuple[Section, ...]:
     """All pages: the topics of public names, the observables, the keys of scene files, the commands."""
     named = tuple(
         Section(_file(title), title, tuple(_of_name(name) for name in names)) for title, names in topics().items()
@@ -113,7 +98,7 @@ def sections(commands: tuple[Command, ...]) -> tuple[Section, ...]:
         *named,
         Section("observables", "Observables", (_of_observables(), *map(_of_observable, OBSERVABLES))),
         Section("scene-files", "Keys of scene files", tuple(map(_of_table, tables()))),
-        Section("commands", "Commands", tuple(map(_of_command, commands))),
+        Section("commands", "Commands", tuple(itertools.starmap(_of_command, commands.items()))),
     )
 
 
@@ -316,21 +301,23 @@ _NAMED = {
 _FEW = {2: "two", 3: "three", 4: "four"}
 
 
-def _of_command(command: Command) -> Entry:
-    rows = "".join(
-        f"<tr id='option.{command.name}.{_text(_long(names))}'><td><code>{_text(names)}</code></td>"
-        f"<td>{_text(default)}</td><td>{_line(about)}</td></tr>"
-        for names, default, about in command.options
-    )
+def _of_command(name: str, command: Any) -> Entry:
+    rows = "".join(_of_option(name, one) for one in command.params if one.name != "help")
     head = "<tr><th>argument or option</th><th>default</th><th>meaning</th></tr>"
-    body = f"<p>{_line(command.about)}</p><table>{head}{rows}</table>"
-    body += f"<pre>{_text(command.example)}</pre>" if command.example else ""
-    return Entry(f"command.{command.name}", f"swarm {command.name}", command.about, body)
+    about, (example, *_codes) = " ".join(command.help.split()), command.epilog.split("\n")
+    body = f"<p>{_line(about)}</p><table>{head}{rows}</table><pre>{_text(example)}</pre>"
+    return Entry(f"command.{name}", f"swarm {name}", about, body)
 
 
-def _long(names: str) -> str:
-    """The long name of an option, of one with several the first; an argument has one."""
-    return next((name for name in names.split(", ") if name.startswith("--")), names)
+def _of_option(command: str, one: Any) -> str:
+    """The row of an argument or option of click: its names, its default, and what it is."""
+    if one.param_type_name == "argument":
+        names, default = [one.metavar], "needed"
+    else:
+        names, default = [*one.opts, *one.secondary_opts], "" if one.default in (None, False) else str(one.default)
+    long = next((name for name in names if name.startswith("--")), names[0])
+    cells = f"<code>{_text(', '.join(names))}</code>", _text(default), _line(one.help)
+    return f"<tr id='option.{command}.{_text(long)}'>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
 
 # --- Pages -----------------------------------------------------------------------------------------------
