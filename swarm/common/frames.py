@@ -34,9 +34,9 @@ ROWS = 1024
 class Frame:
     """A finished frame: what `progress` and the functions of `observables` are called with, and `Result.frames` gives.
 
-    The arrays of particles cannot be written. In a function of `observables` they are the run's own, which the next
-    frame changes: what it returns is copied. Anywhere else they are copies, made when they are first read; `progress`
-    reads them during its call. Of bodies the particles are all points, of a trajectory those that it keeps.
+    The arrays of particles are copies, made when they are first read, and cannot be written. `progress` and functions
+    of `observables` read them during their call. Of bodies the particles are all points, of a trajectory those that it
+    keeps.
 
     Attributes:
         number: the number of the frame, from 0 on.

@@ -101,7 +101,7 @@ def carry_out_task(task: Task, session: Session) -> Result:
                 if log is not None:
                     log.ends[number] = log.total
                 write(number, moment, run.state, seen)
-                shown = _snapshot_of(task, read, moment, True) if callable(task.options.progress) else NOTHING
+                shown = _snapshot_of(task, read, moment) if callable(task.options.progress) else NOTHING
                 show.frame(Frame(number, moment, until, Observables(seen), writer.written if writer else 0, shown))
                 shown.end()
                 if moment < until:
@@ -171,13 +171,13 @@ def start_of(task: Task) -> Snapshot:
     return _snapshot_of(task, arrays.get, 0.0)
 
 
-def _snapshot_of(task: Task, read: Read, moment: float, copies: bool = False) -> Snapshot:
+def _snapshot_of(task: Task, read: Read, moment: float) -> Snapshot:
     """The particles of a run that are there at a moment [s]."""
     scene, births = task.scene, task.particles.births
     born = read("born_time")
     there: Any = None if births is None else births.there(moment)
     there = there if born is None else ~np.isnan(born)
-    return Snapshot(read, scene.gravity, scene.period, there, copies)
+    return Snapshot(read, scene.gravity, scene.period, there)
 
 
 def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> Result:

@@ -109,13 +109,8 @@ class Measures:
                 self._require_shape(name, value)
             except ValueError as error:
                 raise failure(f"observables[{name!r}] must return {error}, at frame {number}, {time:g} s") from None
-            del given
-            if held := arrays.let_go():
-                raise failure(
-                    f"observables[{name!r}] must keep no array of a frame, which the next one changes; it has kept "
-                    f"{' and '.join(held)} of frame {number}: keep a copy, frame.{held[0]}.copy()"
-                )
             seen[name] = value if value.ndim else value.item()
+        arrays.end()
         return seen
 
     def _require_shape(self, name: str, value: NDArray[np.float64]) -> None:

@@ -60,7 +60,7 @@ class Frames(Sequence[Frame]):
         if born is not None and self._trajectory.radius is not None:
             there = self._trajectory.born(k)
         read = functools.partial(values_of, self._trajectory, k)
-        arrays = Snapshot(read, self._gravity, self._period, there, copies=True)
+        arrays = Snapshot(read, self._gravity, self._period, there)
         return Frame(k, seen["time"], until, Observables(seen), len(self), arrays)
 
 
