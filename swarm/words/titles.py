@@ -21,19 +21,14 @@ _BREVITY = range(7)
 _FEW = 3
 
 
-def of_scene(scene: Scene) -> str:
-    """What a scene is: the vessel, what is in it, gravity, and what its walls do.
+def of_scene(scene: Scene, brief: int = 0) -> str:
+    """What a scene is: the vessel, what is in it, gravity, and what its walls do; less the larger `brief` is.
 
     >>> import swarm
     >>> ball = swarm.Sphere(0.2, side="outside")
     >>> of_scene(swarm.Scene([swarm.Ellipsoid((0.5, 0.5, 0.7)), ball], gravity=(0.0, 0.0, -9.81)))
     'in an ellipsoid with a ball in it, under gravity'
     """
-    return _brief(scene, 0)
-
-
-def _brief(scene: Scene, brief: int) -> str:
-    """The same, with less the larger `brief` is."""
     solids = [one for one in scene.surfaces if one.is_solid()]
     around = [one for one in scene.surfaces if not one.is_solid()]
     flat = scene.plane is not None
@@ -179,7 +174,7 @@ def title(content: Any) -> str:
     step, name = of_method(content.method), of_method(content.method).split(",")[0]
     for brief in _BREVITY:
         method = step if brief < 2 else name
-        text = f"{what}{came} {_brief(content.scene, brief)}: {method}, {end}"
+        text = f"{what}{came} {of_scene(content.scene, brief)}: {method}, {end}"
         if len(text) < LONGEST:
             return text
     return f"{what}: {name}, {end}"
