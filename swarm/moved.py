@@ -72,7 +72,7 @@ _FOLDERS = [
     ("output", "run", "sequence"),
     ("output", "triangles", "curves cut given gridded parts planar shape shapes sharp solids"),
     ("commands", "commands", "export=trajectories info=trajectories report=pictures"),
-    ("fleet", "fleet", "shard_run=sharded_run sharded=sharded_run"),
+    ("fleet", "fleet", "shard_run=sharded_run sharded=sharded_run shown=sweeping"),
     ("kernel.trace", "kernel.trace", "expressions=twins"),
     ("surfaces", "surfaces", "polyhedron=room"),
     ("triangles", "triangles", "given=sharp"),
