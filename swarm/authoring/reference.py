@@ -236,16 +236,12 @@ def _of_table(table: Table) -> Entry:
     place_name = ".".join(filter(None, ("key", table.place, table.kind)))
     rows = ""
     for key in table.keys:
-        default = "needed" if key.needed else "" if key.default is None or key.default == () else _value(key.default)
+        default = "needed" if key.needed else "" if key.default in (None, ()) else json.dumps(key.default, default=str)
         cells = f"<code>{_text(key.name)}</code>", _text(form_in_words(key.form)), _text(default), _line(key.meaning)
         rows += f"<tr id='{place_name}.{key.name}'>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
     head = "<tr><th>key</th><th>value</th><th>default</th><th>meaning</th></tr>"
     anchor = place_name.replace("key", "table", 1)
     return Entry(anchor, title, table.meaning, f"<p>{_line(table.meaning)}</p><table>{head}{rows}</table>")
-
-
-def _value(value: Any) -> str:
-    return json.dumps(value) if isinstance(value, (bool, int, float, str, tuple, list)) else str(value)
 
 
 def form_in_words(form: Form) -> str:

@@ -75,7 +75,7 @@ class AppendedFile:
             superblock.make_appendable(self._handle)
         # HDF5's locks would block readers.
         self._file = driver.opened_to_write(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
-        self._descriptor = _descriptor_of(self._file)
+        self._descriptor = int(self._file.id.get_vfd_handle())
 
     def _find(self) -> None:
         """Find the datasets of a file that is there, and begin."""
@@ -185,7 +185,3 @@ def put(dataset: Any, first: int, values: Any) -> Any:
     space.select_hyperslab((first, *(0 for _ in shape)), entries.shape)
     handle.write(h5py.h5s.create_simple(entries.shape), space, entries)
     return entries
-
-
-def _descriptor_of(file: h5py.File) -> int:
-    return int(file.id.get_vfd_handle())

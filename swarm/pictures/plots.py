@@ -1,6 +1,5 @@
 """A run in one picture: time series that show whether it went well, speeds, and the particles."""
 
-import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -181,14 +180,10 @@ def graphs_of(content: Content) -> list[tuple[str, Callable[[Any], None]]]:
     shown: list[tuple[str, Callable[[Any], None]]] = []
     for group, curves in _shown(content, walls_of(content, -1)).items():
         title = series.GRAPHS[group].across(content.scene.plane).name
-        shown.append((title, functools.partial(_one, content=content, plot={group: curves})))
+        shown.append((title, lambda axes, plot={group: curves}: _series([axes], content, plot, 1)))  # type: ignore[misc]
     if spread := speeds.of_frames(content):
-        shown.append(("speeds", functools.partial(speeds.draw, content=content, spread=spread)))
+        shown.append(("speeds", lambda axes: speeds.draw(axes, content, spread)))
     return shown
-
-
-def _one(axes: Any, content: Content, plot: dict[str, graphs.Curves]) -> None:
-    _series([axes], content, plot, 1)
 
 
 def picture_of_places(

@@ -106,17 +106,13 @@ class Measures:
                 ) from error
             try:
                 value = _numbers(given)
-                self._require_shape(name, value)
+                if value.shape != (before := self._shapes.setdefault(name, value.shape)):
+                    raise ValueError(f"the same shape at every frame, {before} as at those before, got {value.shape}")
             except ValueError as error:
                 raise failure(f"observables[{name!r}] must return {error}, at frame {number}, {time:g} s") from None
             seen[name] = value if value.ndim else value.item()
         arrays.end()
         return seen
-
-    def _require_shape(self, name: str, value: NDArray[np.float64]) -> None:
-        before = self._shapes.setdefault(name, value.shape)
-        if value.shape != before:
-            raise ValueError(f"the same shape at every frame, {before} as at those before, got {value.shape}")
 
 
 # Of a run that has none.

@@ -7,7 +7,6 @@ import numpy as np
 
 from ..bodies.body import Body
 from ..methods import Method
-from ..particles import Particles
 from ..scene import Scene
 from ..surfaces.surface import Surface
 from ..surfaces.union import part_at
@@ -110,7 +109,8 @@ def of_particles(content: Any) -> str:
 
     `content` is the `Content` of a run.
     """
-    count, body, radius = count_of(content), content.body, _radius(content)
+    count, body, frame = count_of(content), content.body, content.frames.get("start", content.frames.get("end"))
+    radius = None if frame is None else frame.radius
     if body is not None:
         return counted(count // len(body), noun_of_body(body))
     text = counted(count, "particle" if radius is None else "ball" if content.scene.plane is None else "disc")
@@ -147,11 +147,6 @@ def noun_of_body(body: Body) -> str:
         return f"chain of {many(points)} points"
     tied = "linkage" if len(body.anchors) or len(body.guides) else "body"
     return f"{tied} of {counted_in_words(points, 'point')}" if points > 1 else "tied point"
-
-
-def _radius(content: Any) -> Any:
-    frame: Particles | None = content.frames.get("start", content.frames.get("end"))
-    return None if frame is None or content.body is not None else frame.radius
 
 
 def of_method(method: Method) -> str:
