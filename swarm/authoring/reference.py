@@ -18,12 +18,12 @@ from typing import Any, NamedTuple
 from ..common.catalog import OBSERVABLES
 from ..common.signature import show_in_lines
 from ..errors import FileError, SceneError
+from ..files import marks
 from ..files.paths import target_of
 from ..version import VERSION
 from . import file_run
 from .docstrings import entries_of, first_line, meanings_of, sections_of
 from .keys import Form, Table, tables
-from .texts import write_text
 
 _HERE, _PACKAGE = Path(__file__).parent, sys.modules[__package__.partition(".")[0]]
 # A topic and names of it, and names on the next lines, in the docstring of the package.
@@ -85,7 +85,7 @@ def write(folder: Path, commands: Mapping[str, Any], overwrite: bool = False) ->
     except OSError as error:
         raise FileError(f"cannot make the folder {target}: {error.strerror}") from error
     for name, text in {**pages, "search.js": search, "reference.js": script}.items():
-        write_text("page of the reference", target / name, text, overwrite)
+        marks.write(target / name, text.encode(), "page of the reference", overwrite)
     return target / "index.html"
 
 

@@ -85,7 +85,7 @@ def report(
     """Make a page of a run or a sweep, one file for any browser: verdicts, pictures, numbers, how to reproduce it."""
     from ..fleet import report as reports
 
-    target = output or reports.file_of(source)
+    target = output or reports.page_file(source)
     reports.report(source, target, overwrite=overwrite)
     written(target)
 

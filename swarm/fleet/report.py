@@ -54,7 +54,7 @@ def report(
     return html.written(lambda: page_of(source, target), target, overwrite, () if source.is_dir() else (source,))
 
 
-def file_of(source: Path) -> Path:
+def page_file(source: Path) -> Path:
     """The file of the report of a run or a folder, where none is named."""
     return (
         source.resolve().with_name(f"{source.resolve().name}.html") if source.is_dir() else source.with_suffix(".html")

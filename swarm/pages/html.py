@@ -13,7 +13,6 @@ from markupsafe import Markup
 from ..common.checks import flag
 from ..errors import SceneError
 from ..files import marks, paths
-from ..files.replaced import replaced
 from ..version import VERSION
 
 _HERE = Path(__file__).parent
@@ -50,10 +49,7 @@ class Page:
             SceneError: the name has another suffix, or the file exists.
             FileError: the file cannot be written.
         """
-        target = checked_target(path, overwrite, self.sources)
-        with replaced(target, "report") as file:
-            file.write(self.html.encode())
-        return target
+        return marks.write(checked_target(path, overwrite, self.sources), self.html.encode(), "report", overwrite)
 
     def _repr_html_(self) -> str:
         style = f"width: 100%; height: {_HEIGHT}px; border: 1px solid #8A8A8A; border-radius: 6px"
