@@ -76,12 +76,10 @@ class GrainsRun(BaseRun):
             spin = np.zeros((3, n))
         feed = None if particles.births is None else Feed(scene, particles, seeding.seed, self._is_clear)
         balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
-        loses = rubs or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
-        ends = laws.may_end
-        loses = loses or laws.may_dissipate or ends
-        # What contacts store with a wall that goes is lost.
-        openings = self._matter.openings
-        loses = loses or scene.has_doors() or openings is not None
+        openings, ends = self._matter.openings, laws.may_end
+        # What contacts store with a wall that goes is lost too.
+        loses = rubs or laws.may_dissipate or ends or scene.has_doors() or openings is not None
+        loses = loses or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
             np.zeros((walls * (2 if scene.moves() else 1), n)), np.zeros(n if loses else 0), None,
@@ -118,23 +116,16 @@ class GrainsRun(BaseRun):
         )
         if feed is not None:
             self._feed, self.state = feed, state._replace(born_time=feed.born_time)
-        self._rubs = rubs
         there = np.arange(n) if feed is None else np.flatnonzero(~np.isnan(feed.born_time))
+        at_ends = laws._replace(restitution=None, friction=None)
+        followed = Followed(Passing(state.mass, state.crossed, state.period, self._pages()), None)
         self._world = World(
             self._rows_of(there),
             *self._room(len(there), _PAIRS * n, _AT_WALLS * n, n if self._fields.faces else None), books,
+            followed=None if counters is None else followed,
+            sender=Sender(at_ends, RandomSource(seeding.signed(), seeding.first)) if laws.send_off else None,
+            held=None if holds is None else held_of(state.mass, rubs), heavy=self._heavy,
         )  # fmt: skip
-        if laws.send_off:
-            sender = Sender(
-                laws._replace(restitution=None, friction=None), RandomSource(seeding.signed(), seeding.first)
-            )
-            self._world = self._world._replace(sender=sender)
-        if holds is not None:
-            self._world = self._world._replace(held=held_of(state.mass, rubs))
-        if counters is not None:
-            passing = Passing(state.mass, state.crossed, state.period, self._pages())
-            self._world = self._world._replace(followed=Followed(passing, None))
-        self._world = self._world._replace(heavy=self._heavy)
         self._clock = np.zeros(arrays.CLOCK)
         self._clock[SKIN] = _SKIN * radius.min()
         self._scale, self._stored = 0.0, math.nan
@@ -170,7 +161,7 @@ class GrainsRun(BaseRun):
         """The rows of particles with these numbers."""
         state, spin = self.state, self.state.spin
         assert state.radius is not None
-        turning = None if spin is None or not self._rubs else spin[:, some]
+        turning = None if spin is None or not self._matter.rubs else spin[:, some]
         made = arrays.grains_of(
             state.position[:, some], state.velocity[:, some], state.radius[some], state.mass[some], turning
         )  # fmt: skip
