@@ -29,7 +29,6 @@ from ..run.preflight.counting import counters_of, crossed_of, with_counters
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
-from ..scene import Scene
 from ..state import Balls, Floats, State, none_left
 from . import energy, lists, refused
 from . import grain_arrays as arrays
@@ -137,11 +136,6 @@ class GrainsRun(BaseRun):
         """The walls in the frame, or its piece, that ends at a moment [s], by the lists' skin [m]."""
         walls, heavy = self._fields.walls(moment, skin), self._heavy
         return walls if heavy is None else with_heavy(walls, compiled, heavy, self._matter.h)
-
-    def _scene_now(self) -> Scene:
-        """The scene with the walls that have a mass where they are."""
-        seen = self._observed
-        return self._scene if seen is None else self._scene.placed(seen.position, seen.orientation)
 
     def _is_clear(self, place: Floats, radius: float, moment: float) -> bool:
         """Whether a place is clear of the walls that have a mass and are there at a moment [s]."""
@@ -306,8 +300,10 @@ class GrainsRun(BaseRun):
         if instant not in self._scene.instants:
             return
         if (came := comers(self._scene, instant)).any():
-            deepest = OUTSIDE * self._scene.finite_size()
-            require_free(self._scene_now(), self._seen_state(), came, deepest, instant, self._first)
+            seen, deepest = self._observed, OUTSIDE * self._scene.finite_size()
+            # With the walls that have a mass where they are.
+            scene = self._scene if seen is None else self._scene.placed(seen.position, seen.orientation)
+            require_free(scene, self._seen_state(), came, deepest, instant, self._first)
         self._stored_before = self._stored_at(self._walls_of(self._compiled, instant, float(self._clock[SKIN])), 0.0)
 
     def _stored_at(self, walls: Any, remaining: float) -> NDArray[np.float64]:
