@@ -1,7 +1,7 @@
 """The scene as users describe it: surfaces and gravity, checked, and the volume that they enclose."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -209,7 +209,7 @@ class Scene:
         if radius is not None:
             return np.asarray((self.distances_outside(points, 0.0, radius) <= 0.0).all(axis=0))
         rows = points if self.period is None else into_cell(self.period, points)[0]
-        admitted = np.full(rows.shape[1], True)
+        admitted = np.zeros(rows.shape[1]) == 0.0
         for image in (image for images in self.pieces.images for image in images if image.is_there(0.0)):
             admitted[admitted] = image.admits(rows[:, admitted])
         return admitted
@@ -468,6 +468,10 @@ class Scene:
     @cached_property
     def _of_points(self) -> CompiledScene:
         return CompiledScene(self)
+
+    def at_frame(self, seen: Mapping[str, Any], k: int) -> "Scene":
+        """The scene with its walls that react held where they are at frame k of the observables of a run."""
+        return self.placed(seen["wall_position"][k], seen["wall_orientation"][k]) if self.reacts() else self
 
     def placed(self, positions: ArrayLike, orientations: ArrayLike) -> "Scene":
         """The scene with its walls that react held at the `wall_position` and `wall_orientation` of a frame."""

@@ -34,9 +34,9 @@ ROWS = 1024
 class Frame:
     """A finished frame: the argument of `progress` and of functions in `observables`, and an entry of `Result.frames`.
 
-    The arrays of particles are read-only. In a function of `observables` they are the run's own, which the next
-    frame changes: its result is copied. Elsewhere they are copies, made when they are first read; `progress`
-    reads them during its call. For bodies the particles are all points, for a trajectory those that it keeps.
+    The arrays of particles are read-only copies, made when they are first read. `progress` and functions
+    of `observables` read them during their call. For bodies the particles are all points, for a trajectory those
+    that it keeps.
 
     Attributes:
         number: the number of the frame, from 0 on.
@@ -168,14 +168,14 @@ class FrameTimes(Validated):
             before = number * self.every
         yield self.count - 1, before, self.until
 
-    def on_disk(self, surfaces: int, more: int = 0) -> int:
-        """Return the bytes of a file without its particles: groups and observables of all frames, `more` in each."""
+    def on_disk(self, surfaces: int) -> int:
+        """Return the bytes of a file without its particles: groups and the observables of all frames."""
         rows = -(-self.count // ROWS) * ROWS
-        return _GROUPS + _CHECKSUMS * self.count + rows * (_NUMBERS + _SURFACE * surfaces + more)
+        return _GROUPS + _CHECKSUMS * self.count + rows * (_NUMBERS + _SURFACE * surfaces)
 
-    def in_memory(self, surfaces: int, more: int = 0) -> int:
+    def in_memory(self, surfaces: int) -> int:
         """Return the bytes of the observables of all frames in memory."""
-        return self.count * (_OBJECTS + _SURFACE * surfaces + more)
+        return self.count * (_OBJECTS + _SURFACE * surfaces)
 
     def require_room(
         self, first: int, target: Path | None, numbers: int, surfaces: int, packed: bool, more: int = 0

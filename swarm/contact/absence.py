@@ -73,10 +73,7 @@ def _is_covered(openings, rules, walls, wall, r, near):
 
 @outlined
 def hit_wall(openings, rules, walls, motion, wall, near):
-    """Return the wall that a particle (r, v) hits at a wall that it has reached: if this is open, a closed one there.
-
-    Of several closed walls it is the first that the particle reaches.
-    """
+    """Return the wall that a particle (r, v) hits at this one: if it is open, the closed wall that is reached first."""
     r, v = motion
     if not lets_through(openings, walls, wall, r, near):
         return wall

@@ -27,7 +27,7 @@ from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..state import State, none_left
 from .reacting import queue as events
-from .reacting.described import freedoms_of, scenery_of, walls_now
+from .reacting.described import bring_walls, freedoms_of, scenery_of, walls_now
 from .reacting.freedoms import TOO_LONG, TOO_SHORT
 from .reacting.queue import CLOCK, NOW, TAKEN, Queue, ReactionRule, SceneWalls
 
@@ -48,15 +48,15 @@ class ReactingRun(BaseRun):
         energy = 0.5 * (particles.velocity**2).sum(axis=0) + potential(gravity, vec(particles.position))
         self._source = RandomSource(seeding.signed(), seeding.first)
         self._scenery = self._scenery_of(compiled, 0.0)
-        heat = np.zeros((walls, n)) if any(laws.give_heat for laws in self._scenery.each_laws()) else None
+        births, every = particles.births, self._scenery.each_laws()
+        heat = np.zeros((walls, n)) if any(laws.give_heat for laws in every) else None
+        ends = any(laws.may_end for laws in every)
+        starts = births.time.copy() if births is not None else np.zeros(n) if ends else None
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.asarray(energy) + np.zeros(n), np.zeros(n),
-            np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None, heat,
+            np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None, heat, starts=starts,
+            **none_left(n, compiled.openings() is not None, ends),
         )  # fmt: skip
-        births, ends = particles.births, any(laws.may_end for laws in self._scenery.each_laws())
-        self.state = self.state._replace(**none_left(n, compiled.openings() is not None, ends))
-        if births is not None or ends:
-            self.state = self.state._replace(starts=np.zeros(n) if births is None else births.time.copy())
         self._present = Presence(births, self.state, CHUNK)
         tier = Tier(compile, (self._scenery, gravity), n)
         super().__init__(compiled, method, n, threads, tier, seeding, watched)
@@ -98,8 +98,7 @@ class ReactingRun(BaseRun):
         status, particle = self._take(rule, page, latest)
         if status == Status.DONE:
             self._arrive(rule, page)
-            self._tier.kernel(events.settle)(self._scenery, self._freedoms, span)
-            self._freedoms.time.fill(0.0)
+            bring_walls(self._scenery, self._freedoms, span)
             self._clock[events.BEFORE] += span
             self._clock[NOW] = 0.0
         if page is not None:
@@ -177,7 +176,6 @@ class ReactingRun(BaseRun):
         yield events.predict, (*self._moving(rule), *part)
         yield events.take, self._moving(rule)
         yield events.arrive, (self._scenery, self._queue, rule, *part)
-        yield events.settle, (self._scenery, self._freedoms, 0.0)
         yield observables.observe, self._observing()
 
     def _summed(self) -> dict[str, Any]:

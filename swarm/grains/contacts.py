@@ -124,11 +124,11 @@ def begin_solve(pressed_first, ease):
 
 
 def scale_of(matter, push, speeds, ease):
-    """What makes the magnitude of a change of an impulse one relative to what moves there, and what weight does.
+    """A factor: the magnitude of a change of an impulse times it is relative to what moves at the contact and falls.
 
-    With what the solution begins: the size of the impulse, and `speeds`, the magnitude of the relative velocity and the
-    sum of those of both. What counts is the former, by which balls that are carried along are solved as at rest; less
-    than round-off of the latter is not asked for.
+    What moves is taken as the solution begins: the size of the impulse, and `speeds`, the relative speed and the sum of
+    both speeds. The relative speed counts, so that balls that are carried along are solved as at rest, but no less than
+    the round-off of the sum.
     """
     fall = 0.0 if matter.pull is None else matter.h * size_of(matter.pull)
     relative, whole = speeds
@@ -207,22 +207,6 @@ def apart(matter, place, i, j):
     return s + (vector_at(place, i, col.LOST) - vector_at(place, j, col.LOST))
 
 
-def _approach(matter, grains, ball, j):
-    """The square of how near two balls are at an end of the step, at least, and R_i + R_j.
-
-    `ball` is the first one, and the sum of its velocities at both ends.
-    """
-    (i, here), place, speed = ball, grains.place, grains.speed
-    s0 = apart(matter, place, i, j)
-    move = 0.5 * matter.h * (here - (vector_at(speed, j, col.BEFORE) + vector_at(speed, j, col.AFTER)))
-    q0, q1, reach = square(s0), square(s0 + move), place[i, col.RADIUS] + place[j, col.RADIUS]
-    nearest_one = select(q1 < q0, q1, q0)
-    if matter.holds is None:
-        return nearest_one, reach
-    # Where walls hold both they do not meet.
-    return select(place[i, col.LIGHTNESS] + place[j, col.LIGHTNESS] > 0.0, nearest_one, math.inf), reach
-
-
 def _note(rows, c, a, b, k):
     rows[c, col.ONE], rows[c, col.OTHER], rows[c, col.PLACE] = a, b, k
 
@@ -235,14 +219,24 @@ def foresee(matter, grains, course, i):
     course[i, col.EXTENT], course[i, col.YIELDING] = place[i, col.RADIUS], place[i, col.LIGHTNESS]
 
 
-def _approach_of(matter, course, ball, j):
-    """`_approach` by the courses of both balls, that of the first one as it was read: for what round-off decides."""
+def _course(course, i):
+    """The course of a ball, read."""
+    here, move = vector_at(course, i, col.FROM), vector_at(course, i, col.MOVE)
+    return here, move, course[i, col.EXTENT], course[i, col.YIELDING]
+
+
+def _approach(matter, course, ball, j):
+    """The square of how near two balls are at an end of the step, at least, and R_i + R_j, by the courses of both.
+
+    That of the first one is given as it was read. What round-off has taken of places decides nothing here.
+    """
     here, move, extent, yielding = ball
     s0 = nearest(matter.period, here, vector_at(course, j, col.FROM))
     q0, q1 = square(s0), square(s0 + (move - vector_at(course, j, col.MOVE)))
     nearest_one, reach = select(q1 < q0, q1, q0), extent + course[j, col.EXTENT]
     if matter.holds is None:
         return nearest_one, reach
+    # Where walls hold both they do not meet.
     return select(yielding + course[j, col.YIELDING] > 0.0, nearest_one, math.inf), reach
 
 
@@ -263,11 +257,10 @@ def find_pairs(matter, near, touches):
     known, count, passed, margin = touches.used[0], touches.used[0], 0, touches.margin[0]
     for a in range(course.shape[0]):
         i = index(a)
-        extent, yielding = course[i, col.EXTENT], course[i, col.YIELDING]
-        ball = vector_at(course, i, col.FROM), vector_at(course, i, col.MOVE), extent, yielding
+        ball = _course(course, i)
         for k in range(near.first[i], near.first[i + 1]):
             b, was_on = near.mate[index(k)], near.is_on[index(k)]
-            q, reach = _approach_of(matter, course, ball, index(b))
+            q, reach = _approach(matter, course, ball, index(b))
             # Without a branch, which would go either way: a row that does not count is written over.
             is_on = was_on | (q < reach * reach)
             near.is_on[index(k)] = is_on
@@ -283,13 +276,13 @@ def find_pairs(matter, near, touches):
 @outlined
 def _find_missed(matter, grains, near, touches):
     """The same among those that have missed one another by the margin or less."""
-    speed, found, missed, count = grains.speed, touches.found, touches.missed, touches.used[0]
+    course, found, missed, count = touches.course, touches.found, touches.missed, touches.used[0]
     known = count
     for m in range(touches.passed[0]):
         a, b, k = missed[index(m), col.ONE], missed[index(m), col.OTHER], missed[index(m), col.PLACE]
-        i = index(a)
-        ball = i, vector_at(speed, i, col.BEFORE) + vector_at(speed, i, col.AFTER)
-        q, reach = _approach(matter, grains, ball, index(b))
+        foresee(matter, grains, course, index(a))
+        foresee(matter, grains, course, index(b))
+        q, reach = _approach(matter, course, _course(course, index(a)), index(b))
         if (q < reach * reach) & (not near.is_on[index(k)]):
             near.is_on[index(k)] = True
             _note(found, index(count), a, b, k)
@@ -299,7 +292,7 @@ def _find_missed(matter, grains, near, touches):
 
 
 class Travel(Record):
-    """How far balls are at the end of a step from where they were to be, from where they were listed, and moved."""
+    """How far balls are, at the end of a step, from where they were foreseen and listed, and how far they moved."""
 
     off_course: Any  # with the last step's change, at most [m]
     from_list: Any  # their squares, at most [m^2]

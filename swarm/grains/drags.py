@@ -13,7 +13,7 @@ _TURNS = 6
 
 
 class Drags(NamedTuple):
-    """What is not 0, by both particles of a pair, on the first one; and at walls, in the order of the lists."""
+    """What acts: of pairs, by both particles, on the first one; at walls, in the order of the lists."""
 
     used: Array  # (2,) how many pairs there are, and how many contacts at walls
     one: Array  # (room,) int64
@@ -44,7 +44,7 @@ def room_for(near: Any) -> Drags:
 
 
 def set_drags(kernel: Any, world: Any, kept: Drags | None) -> None:
-    """Give them to new lists."""
+    """Give what was kept to new lists."""
     if kept is not None:
         row = np.full(world.books.impacts.size, -1)
         row[world.grains.number] = np.arange(len(world.grains.number))

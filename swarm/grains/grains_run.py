@@ -29,11 +29,10 @@ from ..run.preflight.counting import counters_of, crossed_of, with_counters
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
-from ..scene import Scene
 from ..state import Balls, Floats, State, none_left
 from . import energy, lists, refused
 from . import grain_arrays as arrays
-from .booking import ContactTotals, MemberCounts
+from .booking import ContactTotals
 from .drags import Drags, carry, kept_drags, room_for, set_drags
 from .exits import stored_with_others
 from .faces import Fields
@@ -76,12 +75,10 @@ class GrainsRun(BaseRun):
             spin = np.zeros((3, n))
         feed = None if particles.births is None else Feed(scene, particles, seeding.seed, self._is_clear)
         balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
-        loses = rubs or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
-        ends = laws.may_end
-        loses = loses or laws.may_dissipate or ends
-        # What contacts store with a wall that goes is lost.
-        openings = self._matter.openings
-        loses = loses or scene.has_doors() or openings is not None
+        openings, ends = self._matter.openings, laws.may_end
+        # What contacts store with a wall that goes is lost too.
+        loses = rubs or laws.may_dissipate or ends or scene.has_doors() or openings is not None
+        loses = loses or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
             np.zeros((walls * (2 if scene.moves() else 1), n)), np.zeros(n if loses else 0), None,
@@ -118,24 +115,16 @@ class GrainsRun(BaseRun):
         )
         if feed is not None:
             self._feed, self.state = feed, state._replace(born_time=feed.born_time)
-        self._rubs = rubs
         there = np.arange(n) if feed is None else np.flatnonzero(~np.isnan(feed.born_time))
+        at_ends = laws._replace(restitution=None, friction=None)
+        followed = Followed(Passing(state.mass, state.crossed, state.period, self._pages()), None)
         self._world = World(
             self._rows_of(there),
             *self._room(len(there), _PAIRS * n, _AT_WALLS * n, n if self._fields.faces else None), books,
+            followed=None if counters is None else followed,
+            sender=Sender(at_ends, RandomSource(seeding.signed(), seeding.first)) if laws.send_off else None,
+            held=None if holds is None else held_of(state.mass, rubs), heavy=self._heavy,
         )  # fmt: skip
-        if laws.send_off:
-            sender = Sender(
-                laws._replace(restitution=None, friction=None), RandomSource(seeding.signed(), seeding.first),
-                self._fields.places(),
-            )  # fmt: skip
-            self._world = self._world._replace(sender=sender)
-        if holds is not None:
-            self._world = self._world._replace(held=held_of(state.mass, rubs))
-        if counters is not None:
-            passing = Passing(state.mass, state.crossed, state.period, self._pages())
-            self._world = self._world._replace(followed=Followed(passing, None))
-        self._world = self._world._replace(heavy=self._heavy)
         self._clock = np.zeros(arrays.CLOCK)
         self._clock[SKIN] = _SKIN * radius.min()
         self._scale, self._stored = 0.0, math.nan
@@ -147,11 +136,6 @@ class GrainsRun(BaseRun):
         """The walls in the frame, or its piece, that ends at a moment [s], by the lists' skin [m]."""
         walls, heavy = self._fields.walls(moment, skin), self._heavy
         return walls if heavy is None else with_heavy(walls, compiled, heavy, self._matter.h)
-
-    def _scene_now(self) -> Scene:
-        """The scene with the walls that have a mass where they are."""
-        seen = self._observed
-        return self._scene if seen is None else self._scene.placed(seen.position, seen.orientation)
 
     def _is_clear(self, place: Floats, radius: float, moment: float) -> bool:
         """Whether a place is clear of the walls that have a mass and are there at a moment [s]."""
@@ -171,7 +155,7 @@ class GrainsRun(BaseRun):
         """The rows of particles with these numbers."""
         state, spin = self.state, self.state.spin
         assert state.radius is not None
-        turning = None if spin is None or not self._rubs else spin[:, some]
+        turning = None if spin is None or not self._matter.rubs else spin[:, some]
         made = arrays.grains_of(
             state.position[:, some], state.velocity[:, some], state.radius[some], state.mass[some], turning
         )  # fmt: skip
@@ -216,33 +200,26 @@ class GrainsRun(BaseRun):
             sides = crossed_of(self._matter.counters, self._counted, self._scene, born.position).side
             state.crossed.side[:, born.number] = sides
         self._world = self._world._replace(grains=arrays.beside(grains, self._rows_of(born.number)))
-        near = self._world.near
-        self._make_room(near.mate.size, near.slot.size)
-        self._list_with(kept)
+        self._make_room()
+        self._list(kept)
 
     # --- Lists ---------------------------------------------------------------------------------------------
 
-    def _list(self) -> None:
-        """List anew what is near, where all are now."""
-        self._list_with(kept_drags(self._tier.kernel, self._world))
-
-    def _list_with(self, kept: Drags | None) -> None:
-        """The same, with these impulses of friction of before."""
-        matter, clock, kernel = self._matter, self._clock, self._tier.kernel
+    def _list(self, kept: Drags | None = None) -> None:
+        """List anew what is near, where all are now; with what was kept of contacts, if lists have changed since."""
+        clock, kernel = self._clock, self._tier.kernel
+        kept = kept_drags(kernel, self._world) if kept is None else kept
         self._wrap()
         self._drop_gone()
-        grains, near = self._world.grains, self._world.near
-        if near.wall_is_open is not None:
-            near.wall_is_open[:] = False
-        skin = float(clock[SKIN])
+        grains, skin = self._world.grains, float(clock[SKIN])
+        if self._world.near.wall_is_open is not None:
+            self._world.near.wall_is_open[:] = False
         reach = 2.0 * float(grains.place[:, arrays.RADIUS].max(initial=0.0)) + skin
-        cells, order = lists.cells_of(grains.place[:, X : X + 3], reach, matter.period)
+        cells, order = lists.cells_of(grains.place[:, X : X + 3], reach, self._matter.period)
         for rows in (grains.number, grains.place, grains.speed, grains.change, grains.spin):
             if rows is not None:
                 rows[:] = rows.take(order, axis=0)
-        while (pairs := kernel(lists.list_pairs)(matter.period, grains, near, cells, skin)) > near.mate.size:
-            near = self._make_room(pairs, near.slot.size)
-        self._list_walls(kernel, near, skin)
+        self._list_near(cells, skin)
         if self._heavy is not None:
             self._heavy.listed[:, :3] = self._heavy.place[:, X : X + 3]
         set_drags(kernel, self._world, kept)
@@ -257,28 +234,28 @@ class GrainsRun(BaseRun):
         lost += stored_with_others(self._matter, world, gone)
         self.state.dissipated[world.grains.number] += lost
         # There it stays.
-        self._tier.kernel(energy.show)(world.grains, self.state, world.held)
+        energy.show(world.grains, self.state, world.held)
         stay = {name: aligned_copy(rows[~gone]) for name, rows in world.grains._asdict().items() if rows is not None}
-        rest, near = world.grains._replace(**stay), world.near
-        members = None if near.listed is None else near.listed.size
-        near, touches = self._room(len(rest.number), near.mate.size, near.slot.size, members)
-        self._world = world._replace(grains=rest, near=near, touches=touches)
+        self._world = world._replace(grains=world.grains._replace(**stay))
+        self._make_room()
 
     def _left(self) -> float:
         """What is left of the frame, or of the piece of one, under way [s]."""
         return (self._steps_in(self._span) - float(self._clock[DONE])) * self._matter.h
 
-    def _list_walls(self, kernel: Any, near: arrays.Neighbours, skin: float) -> None:
-        """List what of the walls is near."""
+    def _list_near(self, cells: lists.CellOrder, skin: float) -> None:
+        """List what is near, of balls and of walls, with as much room as that takes."""
+        kernel, grains, left = self._tier.kernel, self._world.grains, self._left()
         if self._fields.reaches(skin):
             self._walls = self._walls_of(self._compiled, self._moment, skin)
-        faces, grains = self._fields.faces, self._world.grains
         while True:
-            at = kernel(lists.list_walls)(self._walls, faces, grains, near, skin, self._left())
-            members = 0 if near.used is None else int(near.used[0])
-            if at <= near.slot.size and (near.listed is None or members <= near.listed.size):
+            near = self._world.near
+            pairs = kernel(lists.list_pairs)(self._matter.period, grains, near, cells, skin)
+            touching = kernel(lists.list_walls)(self._walls, self._fields.faces, grains, near, skin, left)
+            found = pairs, touching, 0 if near.used is None else int(near.used[0])
+            if all(need <= have for need, have in zip(found, _sizes(near), strict=True)):
                 return
-            near = self._make_room(near.mate.size, at, members)
+            self._make_room(*found)
 
     def _wrap(self) -> None:
         """Bring all into the cell that repeats."""
@@ -300,20 +277,13 @@ class GrainsRun(BaseRun):
         near = arrays.near_of(n, walls, pairs, touching, kept, members, matter.openings is not None)
         return near, arrays.touches_of(n, walls, pairs, touching, near.listed)
 
-    def _make_room(self, pairs: int, touching: int, members: int = 0) -> arrays.Neighbours:
-        """Make room for so many pairs, balls at walls, and members of fields, and some more."""
-        near = self._world.near
-        have = 0 if near.listed is None else near.listed.size
-        wanted = (pairs, near.mate.size), (touching, near.slot.size), (members, have)
+    def _make_room(self, *found: int) -> None:
+        """Room for the balls of now in lists that hold nothing: as much as there was, and more than was `found`."""
+        near, wanted = self._world.near, zip(found or (0, 0, 0), _sizes(self._world.near), strict=True)
         pairs, touching, members = (have if need <= have else int(_MORE * need) for need, have in wanted)
-        made, touches = self._room(
-            len(self._world.grains.number), pairs, touching, None if near.listed is None else members
-        )
-        for old, new in zip(near, made, strict=True):
-            if old is not None:
-                new[: len(old)] = old
-        self._world = self._world._replace(near=made, touches=touches)
-        return made
+        number = self._world.grains.number
+        near, touches = self._room(len(number), pairs, touching, None if near.listed is None else members)
+        self._world = self._world._replace(near=near, touches=touches)
 
     def _list_again(self) -> None:
         """List anew in a step, with a wider skin where the lists do not even hold for one."""
@@ -330,16 +300,11 @@ class GrainsRun(BaseRun):
         if instant not in self._scene.instants:
             return
         if (came := comers(self._scene, instant)).any():
-            deepest = OUTSIDE * self._scene.finite_size()
-            require_free(self._scene_now(), self._seen_state(), came, deepest, instant, self._first)
+            seen, deepest = self._observed, OUTSIDE * self._scene.finite_size()
+            # With the walls that have a mass where they are.
+            scene = self._scene if seen is None else self._scene.placed(seen.position, seen.orientation)
+            require_free(scene, self._seen_state(), came, deepest, instant, self._first)
         self._stored_before = self._stored_at(self._walls_of(self._compiled, instant, float(self._clock[SKIN])), 0.0)
-
-    def _switch_walls(self, span: float) -> None:
-        """Lose what contacts stored with walls that went at the instant, by the walls of the piece that begins [s]."""
-        if self._stored_before is not None:
-            self._list()
-            self.state.dissipated[:] += self._stored_before - self._stored_at(self._walls, span)
-            self._stored_before = None
 
     def _stored_at(self, walls: Any, remaining: float) -> NDArray[np.float64]:
         """What the contacts of each ball with walls store when so much of the frame is left [s], (N,) [J]."""
@@ -375,7 +340,11 @@ class GrainsRun(BaseRun):
         if not self._cut_short:
             self._clock[DONE] = 0.0
         if self._instants is not None:
-            self._switch_walls(span)
+            if self._stored_before is not None:
+                # What contacts stored with walls that went at the instant is lost.
+                self._list()
+                self.state.dissipated[:] += self._stored_before - self._stored_at(self._walls, span)
+                self._stored_before = None
             if not self._cut_short and self._fields.any_moves():
                 # How long ago they were listed is known in steps.
                 self._list()
@@ -408,15 +377,13 @@ class GrainsRun(BaseRun):
 
     def _watched_world(self, log: Log | None) -> World:
         """The world with the counts of members, of which another is of a run that goes on, and a log of contacts."""
-        world, places = self._world, self._fields.places
-        if world.sender is not None:
-            # Members are others where the skin has become wider than the images of a cell.
-            world = world._replace(sender=world.sender._replace(places=places()))
-        if log is not None:
-            world = world._replace(noting=Noting(log, places(), self.state.period, self._pages()))
-        if self._tally is None:
+        world, tally = self._world, self._tally
+        noting = None if log is None else Noting(log, self.state.period, self._pages())
+        world = world._replace(noting=noting, counts=None if tally is None else tally.counts())
+        if all(one is None for one in (world.sender, world.noting, world.counts)):
             return world
-        return world._replace(members=MemberCounts(self._tally.counts(), places()))
+        # Members are others where the skin has become wider than the images of a cell.
+        return world._replace(places=self._fields.places())
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         # Of the step.
@@ -441,11 +408,10 @@ class GrainsRun(BaseRun):
         if self._instants is not None or matter.openings is not None:
             into = self.state.dissipated
             yield energy.store_at_walls, (matter, self._walls, 0.0, world.grains, world.near, into)
-        yield energy.show, (world.grains, self.state, world.held)
         yield observables.observe, self._observing()
 
     def _show(self, moment: float) -> None:
-        self._tier.kernel(energy.show)(self._world.grains, self.state, self._world.held)
+        energy.show(self._world.grains, self.state, self._world.held)
         if self._heavy is not None:
             self._observed = observed_of(self._scene, motion_of(self._heavy), moment)
         image, position = self.state.image, self.state.position
@@ -517,3 +483,8 @@ class GrainsRun(BaseRun):
         self._world = self._world._replace(near=near, touches=touches)
         super().restore(arrays, cut_short)
         self._show(self._moment)
+
+
+def _sizes(near: arrays.Neighbours) -> tuple[int, int, int]:
+    """The room for pairs, for balls at walls, and for members of fields."""
+    return near.mate.size, near.slot.size, 0 if near.listed is None else near.listed.size

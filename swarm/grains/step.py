@@ -71,7 +71,7 @@ _STALLED, _STALLED_RUBS, _BETTER, _LEAST_SHARE = 20, 100, 0.7, 1.0 / 64.0
 
 
 class MarchRule(NamedTuple):
-    """The length of the frame in steps, before which of them to stop, and after how many; the end of the frame [s]."""
+    """How many steps a frame has, the one to stop before, after how many to halt, and the end of the frame [s]."""
 
     span: float
     stop: float
@@ -87,11 +87,12 @@ class World(NamedTuple):
     touches: Any
     books: Any
     followed: Any = None  # `Followed` of `Passing`, where there are counters
-    members: Any = None  # `MemberCounts`, or None
+    counts: Any = None  # `Counts` of the contacts with members of walls, or None
     sender: Any = None  # `Sender`, or None where no wall sends balls off
     held: Any = None  # `Held`, or None where no wall holds balls
     noting: Any = None  # `Noting`, or None in a run without a log of contacts
     heavy: Any = None  # `Grains` of the walls with a mass, or None
+    places: Any = None  # of each wall, of each member its number in the scene, (members,) int64; None if not needed
 
 
 # --- Of one step -----------------------------------------------------------------------------------------
@@ -367,8 +368,8 @@ def _book(matter, walls, world):
         book_rolling_pairs(grains, near, touches, books)
     for k, wall in enumerate(walls.each):
         deepest = max(book_wall(matter, matter.walls[k], wall, grains, touches, books, k), deepest)
-        if world.members is not None:
-            count_members(matter, wall, grains, touches, world.members, k)
+        if world.counts is not None:
+            count_members(matter, wall, world, k)
         if matter.walls[k].friction is not None:
             book_rubbing(matter, wall, grains, near, touches, books, k)
         if matter.walls[k].rolling is not None:

@@ -67,7 +67,7 @@ def slide_block(kind, method, walls, gravity, share, lanes):
 
 @outlined
 def _over(method, share, lanes, live, going):
-    """Return the status that ends the call before the next pass, or DONE, and a particle that made no progress."""
+    """Return (the status that ends the call before the next pass, or DONE, a particle that made no progress)."""
     place, passes = going
     if passes >= share.halt[0]:
         return Status.INTERRUPTED.value, 0

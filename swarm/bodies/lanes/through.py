@@ -1,7 +1,7 @@
 """Walls that end, such as the facets of a mesh: which one the straight way of a contact point goes through.
 
-Such a wall is there as far as its edges, and its distance says nothing of places deep behind it or in other cells: what
-a step of a body may have passed is known by the way from its start to its end.
+Such a wall ends at its edges, and its distance says nothing of places that are deep behind it or in other cells. So the
+way from the start of a step to its end says which walls a contact point has passed.
 """
 
 import math

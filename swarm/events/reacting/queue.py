@@ -298,13 +298,6 @@ def lease(scenery, freedoms, clock):
     clock[TAKEN] = 0.0
 
 
-@long_kernel
-def settle(scenery, freedoms, t):
-    """Bring the walls to a time of the frame, which their motions are counted from."""
-    for wall in scenery.reacting:
-        wall.freedom.push(freedoms, t, ZERO, ZERO)
-
-
 def _list(queue, close, i):
     """The number of those that are listed, with particle i if it is near."""
     if queue.near[i] and not queue.listed[i]:
