@@ -91,7 +91,7 @@ def is_masked(value: Any) -> bool:
 
 
 def number(name: str, value: Any, expected: str = "a finite number") -> float:
-    """`value` as a finite float."""
+    """Return `value` as a finite float."""
     try:
         # float() would take the last two, and drop the imaginary part or the mask.
         if isinstance(value, (bool, str, bytes, np.complexfloating)) or is_masked(value):
@@ -105,7 +105,7 @@ def number(name: str, value: Any, expected: str = "a finite number") -> float:
 
 
 def positive(name: str, value: Any) -> float:
-    """`value` as a finite float above zero."""
+    """Return `value` as a finite float above zero."""
     result = number(name, value, "a finite number above 0")
     if result <= 0.0:
         raise SceneError(f"{name} must be above 0, got {result:g}")
@@ -113,7 +113,7 @@ def positive(name: str, value: Any) -> float:
 
 
 def at_least(name: str, value: Any, bound: float) -> float:
-    """`value` as a finite float not below `bound`."""
+    """Return `value` as a finite float not below `bound`."""
     result = number(name, value, f"a finite number, {bound:g} or more")
     if result < bound:
         raise SceneError(f"{name} must be {bound:g} or more, got {result:g}")
@@ -121,7 +121,7 @@ def at_least(name: str, value: Any, bound: float) -> float:
 
 
 def length(name: str, value: Any) -> float:
-    """`value` as a length [m] above zero; its square is finite and not zero."""
+    """Return `value` as a length [m] above zero; its square is finite and not zero."""
     result = positive(name, value)
     if not SMALLEST <= result <= LARGEST:
         raise SceneError(f"{name} must be between {SMALLEST:g} and {LARGEST:g} m, got {result:g}")
@@ -129,7 +129,7 @@ def length(name: str, value: Any) -> float:
 
 
 def magnitude(name: str, value: Any) -> float:
-    """`value` as a number, 0 or more, with a finite square."""
+    """Return `value` as a number, 0 or more, with a finite square."""
     result = at_least(name, value, 0.0)
     if result > LARGEST:
         raise SceneError(f"{name} must be at most {LARGEST:g}, got {result:g}")
@@ -137,7 +137,7 @@ def magnitude(name: str, value: Any) -> float:
 
 
 def positive_magnitude(name: str, value: Any) -> float:
-    """`value` as a number above zero with a finite square."""
+    """Return `value` as a number above zero with a finite square."""
     return magnitude(name, positive(name, value))
 
 
@@ -150,14 +150,14 @@ def part(name: str, value: Any, least: float = 0.0) -> float:
 
 
 def bounded(name: str, value: Any) -> float:
-    """`value` as a number of either sign, with a finite square."""
+    """Return `value` as a number of either sign, with a finite square."""
     result = number(name, value)
     magnitude(f"|{name}|", abs(result))
     return result
 
 
 def count(name: str, value: Any, least: int = 1) -> int:
-    """`value` as an integer not below `least`."""
+    """Return `value` as an integer not below `least`."""
     try:
         if isinstance(value, (bool, np.bool_)) or is_masked(value):
             raise TypeError
@@ -170,7 +170,7 @@ def count(name: str, value: Any, least: int = 1) -> int:
 
 
 def seed(name: str, value: Any) -> int:
-    """`value` as the seed of random numbers: an integer from 0 to 2**64 - 1."""
+    """Return `value` as the seed of random numbers: an integer from 0 to 2**64 - 1."""
     result = count(name, value, least=0)
     if result >= 1 << 64:
         raise SceneError(f"{name} must be below 2**64, got {min(result, 10**300):.6g}")
@@ -179,7 +179,7 @@ def seed(name: str, value: Any) -> int:
 
 @functools.cache
 def memory() -> int:
-    """Memory of this machine [bytes]."""
+    """Return the memory of this machine [bytes]."""
     if hasattr(os, "sysconf"):
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     import psutil  # on Windows
@@ -188,7 +188,7 @@ def memory() -> int:
 
 
 def in_bytes(size: float) -> str:
-    """A number of bytes in a suitable unit.
+    """Return a number of bytes in a suitable unit.
 
     >>> in_bytes(1.46e14)
     '146 TB'
@@ -217,7 +217,7 @@ def particles_fit(name: str, count: int) -> None:
 
 
 def duration(name: str, value: str) -> float:
-    """A time such as "2h", "1h30m", "45 min" or "90" (seconds), in seconds above 0."""
+    """Return a time such as "2h", "1h30m", "45 min" or "90" (seconds) in seconds above 0."""
     parts = re.findall(r"(\d+\.?\d*)\s*([a-z]*)\s*", value)
     known = all(unit in _SECONDS for _number, unit in parts)
     if not known or not re.fullmatch(r"(\d+\.?\d*\s*[a-z]*\s*)+", value):
@@ -226,7 +226,7 @@ def duration(name: str, value: str) -> float:
 
 
 def path_of(name: str, value: Any) -> Path:
-    """The argument `name` as the path of a file.
+    """Return the argument `name` as the path of a file.
 
     Raises:
         SceneError: it is not a path, it is empty, or it is too long for the system.
@@ -252,7 +252,7 @@ def require_short(name: str, path: Path, longest: Path) -> None:
 
 
 def flag(name: str, value: Any) -> bool:
-    """`value` as true or false."""
+    """Return `value` as true or false."""
     if not isinstance(value, (bool, np.bool_)):
         raise SceneError(f"{name} must be true or false, got {shown(value)}")
     return bool(value)
@@ -303,7 +303,7 @@ def entries(name: str, value: Any, count: int, expected: str) -> tuple[Any, ...]
 
 
 def vector(name: str, value: Any) -> Vector:
-    """`value` as three finite floats."""
+    """Return `value` as three finite floats."""
     if isinstance(value, (str, bytes)):
         raise SceneError(f"{name} must be three numbers, got {shown(value)}")
     x, y, z = (number(f"{name}[{i}]", part) for i, part in enumerate(entries(name, value, 3, "three numbers")))
@@ -311,13 +311,13 @@ def vector(name: str, value: Any) -> Vector:
 
 
 def three_lengths(name: str, value: Any) -> Vector:
-    """`value` as three lengths [m] above zero."""
+    """Return `value` as three lengths [m] above zero."""
     x, y, z = (length(f"{name}[{i}]", part) for i, part in enumerate(vector(name, value)))
     return x, y, z
 
 
 def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    """`value` as an array of floats."""
+    """Return `value` as an array of floats."""
     parts = value if isinstance(value, (list, tuple)) else (value,)
     if any(map(is_masked, parts)):
         raise SceneError(f"{name} must be an array without a mask, got a masked one; remove or fill the masked entries")
@@ -377,6 +377,6 @@ def located(where: str, error: object) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """The names in quotes, joined by commas and "and": 'a', 'b' and 'c'."""
+    """Return the names in quotes, joined by commas and "and": 'a', 'b' and 'c'."""
     quoted = [repr(name) for name in names]
     return " and ".join([", ".join(quoted[:-1]), quoted[-1]]) if len(quoted) > 1 else "".join(quoted)

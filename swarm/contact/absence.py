@@ -219,7 +219,7 @@ def _lets_out_at(openings, rules, walls, wall, path, near, part):
 
 
 def _over_bodies(volume, path, near, found, ask, given):
-    """Return ask(found, volume, path, given), for a field after each body that a step may come near to."""
+    """Return ask(found, volume, path, given); of a field repeat it for each body that a step may come near to."""
     if isinstance(volume, Field):
         return _over_members(volume.members, path, near, found, ask, given)
     return ask(found, volume, path, given)

@@ -93,7 +93,7 @@ class Listener:
         self.spent = Spent()
 
     def begins(self, function: Any, is_kernel: bool) -> None:
-        """A compilation begins."""
+        """Report that a compilation begins."""
         self._begun.append(time.monotonic())
         if is_kernel:
             message = _COMPILING.format(function.__name__) if self._sentence is None else self._sentence(function)
@@ -105,7 +105,7 @@ class Listener:
             self._timer.start()
 
     def ends(self) -> None:
-        """A compilation ends."""
+        """Report that a compilation ends."""
         if not self._begun:
             return  # the compilation began before this context
         first = self._begun.pop()

@@ -121,7 +121,7 @@ def block_of(grid, low, high):
 
 
 def over_entries(grid, block, found, ask, *given):
-    """Return ask(found, m, *given), repeated for each entry m of the cells of a block."""
+    """Return `found`, replaced by ask(found, m, *given) for each entry m of the cells of a block."""
     place, along = block
     for k in range(max(along.x, 0) * max(along.y, 0) * max(along.z, 0)):
         x, y, z = k // (along.z * along.y), k // along.z % along.y, k % along.z

@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
-# No compilation takes so long [s]: a lock that lasts is one of a disk without locks. Two processes that compile the
+# No compilation takes this long [s]: a lock that lasts is one of a disk without locks. Two processes that compile the
 # same kernel are slower, but not wrong.
 _LONGEST = 300.0
 # The interval at which a waiting process looks [s]; a compilation takes seconds.

@@ -71,7 +71,7 @@ def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
 
 
 def _escape_lane(share, lanes, i, wall, remaining):
-    """Book that a lane escapes with so much of its frame left [s], and end this."""
+    """End the frame of a lane that escapes when `remaining` is left of it [s], and book the escape."""
     flier, p, counters = lanes.lane(i), index(lanes.particle[i]), share.counters
     if counters is not None:
         counters.retire(share.state, lanes, p, i)
@@ -134,7 +134,7 @@ def step_out_lanes(method, walls, share, lanes, live):
 
 @outlined
 def step_out(method, walls, share, lanes, i):
-    """Let a lane out if it has stepped through an open wall, without energy stored in others; return whether it has."""
+    """Let a lane out if it has stepped through an open wall; lose energy stored in others; return whether it has."""
     flier, out = lanes.lane(i), -1.0
     for k, wall in enumerate(method.at_start(walls, flier.remaining).each):
         if lanes.stand[k, i] == 0.0 and wall.level_of(wall.inner(flier.r)) > 0.0:
