@@ -195,7 +195,7 @@ class Equation(Record):
 
     @outlined
     def bracket(self, sign, first):
-        """Return sizes of kappa with F < 0 and F >= 0, the latter `first` times a power of 2, and whether they were found."""
+        """Return two kappa with F < 0 and F >= 0, the latter `first` times a power of 2, and whether they exist."""
         # Doubling from below meets the smallest root first, and ends: (K) has F > 0 both far out and before the
         # pole.
         farthest = abs(self.surface.farthest_push())
