@@ -210,7 +210,7 @@ class _MeanValueStep(Record):
                 f_high = sign * f
                 if f_high > 0.0:
                     break
-                # The push is still larger: the force grows along this line.
+                # `high` is not past the push yet: the force grows along this line.
                 low, f_low, high = high, f_high, 2.0 * high
             for _i in range(_FORCE_ITERATIONS):
                 kappa = illinois(low, f_low, high, f_high)

@@ -27,8 +27,8 @@ PARTS = 5
 SWEEPS = 40
 # The last sweep but one leaves r1 wrong by no more than this fraction of itself, or of the allowed error of a step.
 _STILL, _SLACK = 64.0 * EPSILON, 0.1
-# The fraction of the error of r1 that a sweep leaves, over the turn of the velocity in a composed step over |v|: 1/3,
-# half of the turn of the longest part, if the wall is as curved along the path as across.
+# A sweep leaves at most this multiple of the error of r1 times the turn of the velocity in a composed step over |v|;
+# it is 1/3, half of the turn of the longest part, if the wall is as curved along the path as across.
 _GAIN = 1.5
 # Round-off of the terms of `defect`, in units of the last place of a coordinate.
 _NOISE = 8.0 * EPSILON

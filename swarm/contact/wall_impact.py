@@ -114,7 +114,7 @@ def _own_law(laws, one, wall, at, arriving, random, acts):
     after = ended.v - u
     is_right = ended.is_right if laws.across is None else ended.is_right & (laws.across.part(after) == 0.0)
     if moving is not None:
-        # A wall would have to carry a particle that waits.
+        # A moving wall would have to carry a particle that waits.
         is_right = is_right & ((ended.wait == 0.0) | (not ended.stays))
     stays, wait = ended.stays, select(is_right & (not ended.wait < 0.0), ended.wait, 0.0)
     speed2 = square(before)

@@ -48,7 +48,7 @@ def copy_row(target: Any, i: Any, source: Any, m: Any, count: Any) -> None:
     """Set target[i, :count] = source[m, :count], for tables in C order.
 
     In a loop over lanes one by one, each a load and a store or two: of assignments LLVM makes gathers, which
-    take AMD processors some 20 cycles each.
+    take AMD processors about 20 cycles each.
     """
     target[int(i), :count] = source[int(m), :count]
 

@@ -20,7 +20,7 @@ from .deferred import compiler
 _SETTINGS = ".numba_config.yaml"
 _COMPILING = "compiling a kernel, once: {}"
 _LOG = logging.getLogger("swarm")
-# A compilation that takes longer [s] gives a warning, as not every run shows what is compiled.
+# A compilation that takes longer [s] gives a warning, as not every run shows its compilations.
 LONG = 10.0
 _SLOW = f"it takes more than {LONG:g} s so far"
 

@@ -130,7 +130,7 @@ class _LongKernel(_Kernel):
 
     By itself it makes twice the code of the kernel of bodies: of 10.6 s for tetrahedra 4.4 are for that, and it runs no
     faster. In flights it unrolls little, and that pays. Within its wrapper a step of bodies would take 1.05 to 1.09 of
-    the time, so only kernels with many arguments have a function of their own, see `wrap`.
+    the time, so only kernels with many arguments are within their wrappers, see `wrap`.
     """
 
     is_in_wrapper = False

@@ -47,7 +47,7 @@ def key_of_kernel(function: Any, kinds: Sequence[Any], others: tuple[Any, ...], 
 
 
 def was_compiled(function: Any, kinds: Sequence[Any], others: tuple[Any, ...], kept: Path) -> bool:
-    """Whether a kernel of these names was compiled before, with any code; if not, no key is needed to find none."""
+    """Whether a kernel of these names was compiled before, with any code; if not, its key need not be computed."""
     return any(kept.glob(f"{_names_of(function, kinds, others).text}*"))
 
 

@@ -165,7 +165,7 @@ class Frozen:
         return None
 
     def _is_by_name(self, value: Any) -> bool:
-        """Whether a thing is identified by its name: it has a version, or is in this package and counts elsewhere.
+        """Whether a thing is identified by its name: by its version, or as code of this package that counts elsewhere.
 
         The name of the cache's folder follows from the code of the tracer and the versions of its tools.
         """

@@ -1,6 +1,6 @@
 """Round-off of float64 numbers, of one operation and of many.
 
-That of many operations is a fraction of the numbers that a quantity consists of, such as a coordinate, a size, or the
+The second is a fraction of the numbers that a quantity consists of, such as a coordinate, a size, or the
 terms of a sum.
 """
 

@@ -17,7 +17,7 @@ from ..common.validated import Bounded, Number, PositiveMagnitude, Validated
 from ..errors import SceneError
 from ..state import Floats
 
-# The largest angle of a motion [rad], where float64 numbers are 1.2e-7 rad apart; far larger ones have no sine.
+# The largest angle of a motion [rad], where float64 numbers are 1.2e-7 rad apart; the sine of larger ones is inexact.
 LARGEST_ANGLE = 1e9
 
 
@@ -221,7 +221,7 @@ def led(motion: Motion | None, start: ArrayLike) -> Led:
 
 
 def require_angles(name: str, motion: Any, until: float) -> None:
-    """Raise a `SceneError` if a motion, called `name`, turns so often until a time [s] that its angle is not known."""
+    """Raise a `SceneError` if a motion, called `name`, turns by more than LARGEST_ANGLE until a time [s]."""
     for one in parts_of(motion):
         oscillates = isinstance(one, Oscillation)
         if not oscillates and not isinstance(one, Rotation):

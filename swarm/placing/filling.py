@@ -200,7 +200,7 @@ def _measured(scene: Scene, state: Any) -> VolumeEstimate:
 
 def _exact(scene: Scene) -> VolumeEstimate | None:
     """Return the volume in closed form, or None."""
-    from .closed_form import closed_form  # loaded where a volume is asked for
+    from .closed_form import closed_form  # loaded only for volumes
 
     volume = closed_form(scene)
     return None if volume is None else VolumeEstimate(volume, 0.0)
