@@ -63,7 +63,7 @@ def read_columns(
 
     Raises:
         SceneError: the file cannot be read, a column is missing or unknown, or a cell is not a number; it names file,
-            and column.
+            row and column.
     """
     rows = _rows_of(path)
     header = [name.strip() for name in rows[0][1]] if rows else []

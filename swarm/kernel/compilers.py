@@ -1,4 +1,4 @@
-"""A kernel is one module of LLVM, which is optimised as a whole, where that pays.
+"""A kernel is one module of LLVM, which is optimised as a whole, as far as that pays.
 
 By itself Numba optimises each function, with all that it calls, and makes machine code of it that never runs: a
 kernel links the text. So helpers that a trace leaves to Numba are compiled to LLVM's text only. The garbage collector
@@ -48,8 +48,8 @@ def features_of(codegen: Any) -> str:
     Measured in turn on a Sapphire Rapids, times of 256 bits: an impact on walls that swing or turn 0.7 to 0.8, a
     formula of degree 4 0.80, boxes and rotated ellipsoids 0.8 to 0.9, other shapes 0.9 to 1.0 with gravity or without,
     meshes 0.93 to 0.97, first calls the same. Balls, bodies and sliding gain nothing (0.97 to 1.07): their loops are
-    meshes 0.93 to 0.97, first calls the same. Balls, bodies and sliding gain nothing (0.97 to 1.07): their loops are
     short or in scalars, so a `_LongKernel` keeps 256 bits, except that of grains, where all lanes of a group are one
+    vector.
 
     No sum over lanes is reordered, so bits are the same. $NUMBA_CPU_FEATURES is taken as it is.
     """

@@ -83,7 +83,7 @@ def wrapped(layer, count):
 def _place(d, inverse, count):
     """Return the layer of cells; the outermost ones are a little wider, as a flight that leaves the grid goes farther.
 
-    A place before the first layer is -1, one beyond the last `count`: layers without end, except at the grid.
+    A place before the first layer is -1, one beyond the last `count`: these layers have no end outwards.
     """
     place = d * inverse
     outside = select(place >= count + 0.5 * MARGIN, count, layer_of(place, count))
@@ -155,7 +155,7 @@ def _comes(time, place, count):
 
 
 def _until_next_layer(layers, place, x, v, pull):
-    """Return the time at which a flight leaves its layer (low, width, margin, count); outside, before it enters one.
+    """Return the time at which a flight leaves its layer (low, width, margin, count); outside, until it may enter one.
 
     With a bound of the acceleration it is the earliest possible time.
     """

@@ -43,7 +43,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
     With an exponent above 1 it does not converge in a useful number of sweeps, as Phi'(0) = 0: lambda grows without
     end, and V falls only as a power of the number of sweeps. Use `Penalty` for such walls, for example Hertz's law.
 
-    In an edge sharper than about 0.1 rad the loop over its walls takes too many sweeps: on_unconverged="impact". The
+    In an edge sharper than about 0.1 rad the sweeps over its walls are too many: use on_unconverged="impact". The
     converged step is a reflection about D: `Impact(contact_step=dt)` computes it without the loop at a twentieth of the
     cost and to round-off. This method is for the paper's results, and for studies of multipliers.
 
