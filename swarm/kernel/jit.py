@@ -117,6 +117,6 @@ def _prepared(function: F, is_outlined: bool) -> F:
 def allocating(function: F, body: Any) -> F:
     """Mark a helper of the user's, which may make arrays; kernels call `body` in its place."""
     if not cache.is_disabled():
-        function.in_kernels = body  # type: ignore[attr-defined]  # what the digest of its code is of
+        function.in_kernels = body  # type: ignore[attr-defined]  # the code that the digest covers
         defer(lambda machine_code: machine_code.prepare_helper(function, body=body))
     return function
