@@ -101,6 +101,11 @@ REFUSED = {
     "tilted plane": ([TILTED], (1.0, 1.0, None), r"surfaces\[0\] \(Plane\) must be bounded along y"),
     "cavity": ([swarm.Sphere(0.5)], CELL, r"surfaces\[0\] \(Sphere\) must be within the cell, from 0 to 1 along x"),
     "along it": ([CARRIED], CELL, r"surfaces\[0\]\.motion must leave the surface where it is along x"),
+    "turntable": (
+        [swarm.Plane((0.0, 0.0, -1.0), friction=0.2, motion=swarm.Rotation((0.0, 0.0, 1.0), 1.0))],
+        (None, 1.0, None),
+        r"surfaces\[0\]\.motion must not turn a surface that goes on over the faces of the cell along y",
+    ),
     "heavy": ([HEAVY], CELL, r"surfaces\[0\]\.mass and inertia must be None"),
 }
 
