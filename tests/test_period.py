@@ -269,7 +269,7 @@ def test_a_trajectory_keeps_images_and_the_cell(job, tmp_path):
             assert (position[:2] < [[0.5], [0.8]]).all()
         # A run goes on from there.
         swarm.simulate(trajectory.scene, end, job.method, until=0.1, compile="never")
-    assert summary.of_trajectory(path)["period"] == "a cell that repeats after 0.5 m along x and 0.8 m along y"
+    assert summary.of_file(path)["period"] == "a cell that repeats after 0.5 m along x and 0.8 m along y"
     with h5py.File(path) as file:
         box = file["particles/all/box"]
         assert list(box.attrs["boundary"]) == ["periodic", "periodic", "none"]
