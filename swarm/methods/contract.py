@@ -265,6 +265,7 @@ class MethodNumbers(Record):
     def hard_pass(self, walls, gravity, lane, wall, lanes, i):
         """Return the `Contact` that `flight` or `contact` left to this function, and its status.
 
-        Add to `lanes.impulse[wall, i]`, and write the sweeps of a multiplier loop to `lanes.record[:, i]`.
+        Add to `lanes.impulse[wall, i]`, and write the sweeps of a multiplier loop to `lanes.record[:, i]`. In a
+        method with steps into walls it has no new impacts: these are counted from the impulses of all walls.
         """
         return refused(lane, Status.STALLED.value)
