@@ -65,6 +65,7 @@ class Frozen:
         self._prepared, self._package = prepared, package
         self._hash = hashlib.sha256()
         self._copies: dict[Function, Function] = {}
+        self._numbers: dict[Function, int] = {}
         self._classes: list[type] = []
         self.is_known = True
 
@@ -81,8 +82,9 @@ class Frozen:
             self.function(function.in_kernels)
             return function
         if function in self._copies:
-            self.add("again", list(self._copies).index(function))
+            self.add("again", self._numbers[function])
             return self._copies[function]
+        self._numbers[function] = len(self._numbers)
         code = function.__code__
         # Numba looks up the module of a function by this name when it loads a kernel.
         scope: dict[str, Any] = {"__name__": __name__, "__builtins__": builtins}
@@ -228,8 +230,8 @@ def _taken(code: types.CodeType, names: set[str]) -> list[Any]:
     `co_names` also has the names of attributes. Reading the bytes takes a tenth of the time of `dis`.
     """
     constants, extended, raw = set[int](), 0, code.co_code
-    for k in range(0, len(raw), 2):
-        operation, argument = raw[k], raw[k + 1] | extended
+    for operation, last in zip(raw[::2], raw[1::2], strict=True):
+        argument = last | extended
         extended = argument << 8 if operation == dis.EXTENDED_ARG else 0
         if operation in _CONSTANTS:
             constants.add(argument)
@@ -260,6 +262,8 @@ def _root(value: Any) -> str:
 
 def _module_of(value: Any) -> str:
     """Return the module that identifies a value, or nothing if its module does not."""
+    if isinstance(value, (type, types.FunctionType)):  # most of what is asked about
+        return str(getattr(value, "__module__", ""))
     if isinstance(value, np.ufunc) and getattr(np, value.__name__, None) is value:
         return "numpy"
     if isinstance(value, types.ModuleType):
@@ -267,6 +271,6 @@ def _module_of(value: Any) -> str:
     if isinstance(value, types.BuiltinFunctionType) and isinstance(value.__self__, type):
         return value.__self__.__module__  # `tuple.__new__`
     # The module of an instance does not describe its value; NumPy's functions have a class of their own.
-    named = isinstance(value, (type, types.FunctionType, types.BuiltinFunctionType))
+    named = isinstance(value, types.BuiltinFunctionType)
     named = named or (callable(value) and type(value).__module__.split(".")[0] == "numpy")
     return str(getattr(value, "__module__", "")) if named else ""
