@@ -8,6 +8,7 @@ from compared import Inner, Record, assert_the_same, bits, compiled_only, in_ker
 
 from swarm.kernel import record as records
 from swarm.kernel.jit import inlined, outlined
+from swarm.kernel.trace import calls
 from swarm.kernel.trace.frame import UNROLLED
 
 pytestmark = compiled_only
@@ -470,3 +471,42 @@ def test_a_part_is_made_for_each_int_that_is_known():
 def test_a_function_that_gives_nothing():
     assert_the_same(nothing_comes_back, *[(np.zeros(2), x) for x in NUMBERS])
     assert_the_same(nothing_comes_back, *[(np.zeros(2), x) for x in NUMBERS], outlined=True)
+
+
+# --- Arguments of a part ---------------------------------------------------------------------------------
+
+
+@outlined
+def of_two_tables(values, table, k):
+    return values[k] + table[1, k]
+
+
+def through_parts(values, table, columns, sparse, k):
+    sparse[k, 1] = of_two_tables(values, table, k) * columns[k, 1] + columns[1, k]
+    for row in range(sparse.shape[0]):
+        if row > k:
+            values[row] = sparse[row, k - 1] + values.size
+    return of_two_tables(values[1:], table, k), sparse.shape[0] * table.size, values, columns[k]
+
+
+@outlined
+def in_one_part(values, table, k):
+    return values[k] + table[1, k]
+
+
+def through_one_part(values, table, k):
+    return in_one_part(values, table, k)
+
+
+def test_arrays_of_each_layout_go_through_parts():
+    numbers = np.arange(12.0).reshape(3, 4)
+    tables = numbers, np.asfortranarray(numbers), np.arange(24.0).reshape(3, 8)[:, ::2]
+    cases = ((np.arange(5.0), *(one.copy("K") for one in tables[:2]), tables[2], k) for k in (0, 1, -1))
+    assert_the_same(through_parts, *cases, outlined=True, numba_has_it=False)
+
+
+def test_a_part_takes_of_an_array_what_it_uses():
+    """The place of its numbers, and the length that an index from the end needs; not the seven numbers of an array."""
+    assert in_kernel(through_one_part)(np.arange(3.0), np.ones((2, 3)), 1) == 2.0
+    (part,) = calls.REPLACED[in_one_part].__self__._parts.values()
+    assert sorted(one.number for one, _path in part.taken) == [0, 0, 1, 1, 2]

@@ -5,6 +5,7 @@ Each operation is emitted by Numba's own lowering.
 
 import functools
 import itertools
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -59,6 +60,49 @@ class FunctionPart:
 
         return again(self.result)
 
+    @functools.cached_property
+    def taken(self) -> list[tuple[Argument, tuple[int, ...]]]:
+        """What it takes: of an argument that is an array only those parts of it that are used.
+
+        A call hands on each of them, and in a union of two boxes balls have arrays of 400.
+        """
+        found = dict.fromkeys(_taken_by(self))
+        return [(one, path) for one, path in found if not any((one, path[:k]) in found for k in range(len(path)))]
+
+
+def _taken_by(part: FunctionPart) -> Iterator[tuple[Argument, tuple[int, ...]]]:
+    """The arguments that notes are about, each with the path of a part of it."""
+
+    def of(given: Any, path: tuple[int, ...] = ()) -> Iterator[tuple[Argument, tuple[int, ...]]]:
+        values = (one for one in leaves(given) if isinstance(one, Value) and isinstance(one.note, Argument))
+        return ((one.note, (*one.path, *path)) for one in values)
+
+    yield from of(tuple(part.numbers))
+    for note in part.notes:
+        if isinstance(note, PartCall):
+            for one, path in note.part.taken:
+                yield from of(note.given[one.number], path)
+        elif isinstance(note, Element):
+            yield from of((*note.place, note.value))
+            for path in _address_of(note):
+                yield from of(note.array, path)
+        elif isinstance(note, Assign):
+            yield from of(tuple(value for _slot, value in note.pairs))
+        elif isinstance(note, (Call, Attribute, Branch)):
+            yield from of(note.given if isinstance(note, Call) else getattr(note, "of", None))
+            yield from of(getattr(note, "condition", None))
+
+
+def _address_of(note: Element) -> Iterator[tuple[int, ...]]:
+    """The paths of what the address of an element is made of."""
+    kind, axes = note.array.kind, range(len(note.place))
+    field = default_manager[kind].get_field_position
+    yield (field("data"),)
+    others = {"A": axes[:0], "C": axes[1:], "F": axes[:-1]}[kind.layout]
+    signed = [k for k, one in enumerate(note.place) if isinstance(one, Value) and one.kind.signed]
+    yield from ((field("shape"), k) for k in (*others, *signed))
+    yield from ((field("strides"), k) for k in axes if kind.layout == "A")
+
 
 def _is_argument(given: Any) -> bool:
     """Whether a part takes it as an argument: a known integer or boolean makes another part."""
@@ -77,7 +121,7 @@ def key_of(given: Any) -> Any:
 
 def emit(context: Any, builder: Any, part: FunctionPart, given: Any) -> Any:
     """Return the result of a part that is written out where the builder is."""
-    writer = _Emission(context, builder, dict(zip(part.arguments, given, strict=True)))
+    writer = _Emission(context, builder, {(one, ()): value for one, value in zip(part.arguments, given, strict=True)})
     writer.emit(part.notes)
     return writer.value(part.result)
 
@@ -85,10 +129,11 @@ def emit(context: Any, builder: Any, part: FunctionPart, given: Any) -> Any:
 class _Emission:
     """The state of an emission: the values and the places that are known at this point."""
 
-    def __init__(self, context: Any, builder: Any, values: dict[Any, Any]) -> None:
-        self._context, self._builder, self._values = context, builder, values
+    def __init__(self, context: Any, builder: Any, taken: dict[Any, Any]) -> None:
+        self._context, self._builder = context, builder
+        self._values: dict[Any, Any] = {}
         self._parts: dict[Any, Any] = {}  # of tuples, in this block
-        self._taken: dict[Any, Any] = {}  # of arguments, where the notes begin
+        self._taken = taken  # arguments and parts of them, where the notes begin
         self._start = builder.block
         self._blocks: dict[Label, Any] = {}
         self._slots: dict[Slot, Any] = {}
@@ -123,14 +168,14 @@ class _Emission:
         return self.value(given) if have == kind else self._context.cast(self._builder, self.value(given), have, kind)
 
     def _part(self, note: Any, path: tuple[int, ...]) -> Any:
-        if not path:
-            return self._values[note]
         if isinstance(note, Argument):
             if (note, path) not in self._taken:
                 of = self._part(note, path[:-1])
                 with self._builder.goto_block(self._start):
                     self._taken[note, path] = self._builder.extract_value(of, path[-1])
             return self._taken[note, path]
+        if not path:
+            return self._values[note]
         if (note, path) not in self._parts:
             self._parts[note, path] = self._builder.extract_value(self._part(note, path[:-1]), path[-1])
         return self._parts[note, path]
@@ -230,13 +275,16 @@ class _Emission:
         part, builder, context = note.part, self._builder, self._context
         function, kind = _function_of(context, builder.module, part)
         place = cgutils.alloca_once(builder, kind)
-        given = [self.value(v) for v in note.given]
+        given = [self._given(note.given[one.number], path) for one, path in part.taken]
         status = builder.call(function, [place, context.call_conv._get_excinfo_argument(builder.function), *given])
         failed = builder.icmp_unsigned("!=", status, ir.Constant(status.type, 0))
         with cgutils.if_unlikely(builder, failed):
             builder.ret(status)
         self._parts = {}
         self._values[note] = builder.load(place)
+
+    def _given(self, given: Any, path: tuple[int, ...]) -> Any:
+        return self._part(given.note, (*given.path, *path)) if isinstance(given, Value) else self.value(given)
 
     _WAYS: ClassVar[dict[Any, Any]] = {
         Call: _call,
@@ -287,12 +335,15 @@ def _function_of(context: Any, module: Any, part: FunctionPart) -> tuple[Any, An
         return function, result
     numbas = context.call_conv.get_function_type(types.none, ())
     status, error = numbas.return_type, numbas.args[1]
-    kinds = [context.get_value_type(one.kind) for one in part.arguments]
+    kinds = [
+        functools.reduce(lambda kind, k: kind.elements[k], path, context.get_value_type(one.kind))
+        for one, path in part.taken
+    ]
     function = ir.Function(module, ir.FunctionType(status, [result.as_pointer(), error, *kinds]), name)
     function.linkage = "internal"
     function.attributes.add("alwaysinline" if part.inlined else "noinline")
     builder = ir.IRBuilder(function.append_basic_block("entry"))
-    writer = _Emission(context, builder, dict(zip(part.arguments, function.args[2:], strict=True)))
+    writer = _Emission(context, builder, dict(zip(part.taken, function.args[2:], strict=True)))
     writer.emit(part.notes)
     for k, one in enumerate(part.numbers):
         builder.store(writer.value(one), cgutils.gep_inbounds(builder, function.args[0], 0, k))
