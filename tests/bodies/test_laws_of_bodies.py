@@ -160,3 +160,16 @@ def test_groups_of_a_mesh_have_laws_of_their_own():
         assert seen["impacts"][-1] > 0
         assert (seen["wall_heat"][-1].sum() < -0.1 * seen["total_energy"][0]) == hot
         assert seen["energy_error"].max() < 1e-12
+
+
+@pytest.mark.slow
+def test_laws_that_absorb_nothing_are_compiled():
+    """As in plain Python: a kernel without a law that absorbs has no room for what is absorbed."""
+    scene = swarm.Scene([swarm.Sphere(0.5, laws=[swarm.Lambert(0.5)])])
+    start = swarm.place(scene, swarm.dumbbell(0.1, 1.0), 3, speed=1.0, seed=1)
+    plain, compiled = (
+        swarm.simulate(scene, start, swarm.Impact(dt=5e-3), until=1.0, seed=5, compile=when)
+        for when in ("never", "always")
+    )
+    assert plain.observables["impacts"][-1] > 3
+    np.testing.assert_array_equal(compiled.bodies.position, plain.bodies.position)

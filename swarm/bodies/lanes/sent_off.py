@@ -107,7 +107,7 @@ def _by_law(bodies, state, name, frame, contact, i):
         return False
     row = bodies.walls.row(float(w))
     arrives = touching.place(bodies.lanes.v, name[a, 0], i)
-    if sent.wait == math.inf:
+    if state.absorbed_time is not None and sent.wait == math.inf:
         blow.tell(state, 0, arrives, mass * rate[0], i)
         state.impulse[row, number] += mass * rate[0]
         state.absorbed_time[number], state.absorbed_wall[number] = bodies.rule.end - bodies.pace.remaining[i], w
