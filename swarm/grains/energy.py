@@ -1,4 +1,4 @@
-"""What contacts store at a frame, and the frame as others see it."""
+"""The energy that contacts store at a frame, and the state of the balls that observables and files read."""
 
 from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined
@@ -12,7 +12,7 @@ from .vessel import met
 
 @long_kernel
 def store_at_walls(matter, walls, remaining, grains, near, into):
-    """Add what the contacts of each ball with walls store when so much of the frame is left to an array [J]."""
+    """Add the energy [J] that the contacts of each ball with walls store when `remaining` [s] of the frame is left."""
     place = grains.place
     for number, wall in enumerate(walls.at(remaining).each):
         for k in range(near.wall_first[number], near.wall_first[number + 1]):
@@ -37,7 +37,7 @@ def _stored_at_wall(matter, wall, grains, near, number):
 
 @long_kernel
 def stored(matter, walls, grains, near):
-    """The energy that all contacts store now [J], and the largest overlap [m]."""
+    """Return the energy that all contacts store now [J], and the largest overlap [m]."""
     place, total, deepest = grains.place, 0.0, 0.0
     for a in range(place.shape[0]):
         i = index(a)
@@ -55,7 +55,7 @@ def stored(matter, walls, grains, near):
 
 @long_kernel
 def show(grains, state, held):
-    """Copy where balls are, and how fast, into the state, in the order of the particles; `held` is a `Held` or None."""
+    """Copy positions, velocities and spins into the state, in the particles' order; `held` is a `Held` or None."""
     for k in range(grains.number.size):
         i = index(k)
         one, v = index(grains.number[i]), velocity_of(held, grains, i)

@@ -26,18 +26,18 @@ from .grain_arrays import ROUNDNESS, OfWall, set_vector, vector_at
 from .heavy_walls import ease_across, is_heavy, now, react
 from .vessel import gives_work, met
 
-# The square of the length of a unit vector is this near to 1.
+# The error of the square of the length of a unit vector.
 _UNIT = 8.0 * EPSILON
 
 
 def across(a, n):
-    """What of a vector is across another one; all of it where that is 0."""
+    """The part of a vector perpendicular to n; the whole vector where n is 0."""
     size2 = square(n)
     return a - (dot(a, n) / select(size2 > 0.0, size2, 1.0)) * n
 
 
 def rubbed(drag, slip, ease, limit):
-    """The impulse of friction of no more than a limit, from the last one, the slip at the end with it, and its ease."""
+    """Return the impulse of friction, at most `limit`, from the last one, the slip at the end with it, and its ease."""
     stick = drag - slip * (1.0 / ease)
     size = math.sqrt(square(stick))
     return stick * select(size > limit, limit / select(size > 0.0, size, 1.0), 1.0)
@@ -48,7 +48,7 @@ def rubbed(drag, slip, ease, limit):
 
 def arm_of(way, size, change, nearness):
     """s/R of two balls, from their `Closing`, |s0|, the change of the gap, and 1/R."""
-    # s0 + s1 is `along` times |s0| + |s1|
+    # s0 + s1 = (|s0| + |s1|) along.
     return way.along * (0.5 * (2.0 * size - change) * nearness)
 
 
@@ -56,25 +56,25 @@ def arm_of(way, size, change, nearness):
 
 
 def _carried(wall, r0, r1):
-    """Twice the mean velocity of a wall's surface over a step, and that at its end."""
+    """Return twice the mean velocity of the surface of a wall over a step, and the velocity at its end."""
     last = velocity_at_end(wall, r1)
     return (wall.velocity(r0) if isinstance(wall, Posed) else ZERO) + last, last
 
 
 def _facing(own, way, radius, r0, move):
-    """The unit normal of a contact with a wall, and `_carried` of the wall at the contact.
+    """Return the unit normal of a contact with a wall, and the velocities `_carried` of the wall there.
 
-    The normal is 0 where a step goes from one side of a slab to the other as far: what its ends store is the same.
+    The normal is 0 where a step leads through a slab to the same depth on its other side, with the same stored energy.
     """
     n, size2 = way.along, square(way.along)
-    # At a flat wall `along` is the normal, but in a step from one side of a slab to the other.
+    # At a flat wall `along` is the unit normal, except in a step from one side of a slab to the other.
     if not (own.flat and abs(size2 - 1.0) <= _UNIT):
         n = n * (1.0 / math.sqrt(select(size2 > 0.0, size2, 1.0)))
     return n, _carried(own, r0 - radius * n, r0 + move - radius * n)
 
 
 def faced(wall, grains, touches, c, i, move):
-    """`_facing` of a ball that moves so."""
+    """Return the result of `_facing` for a ball with a move."""
     rows = touches.wall_rows
     radius, r0 = grains.place[i, col.RADIUS], vector_at(rows, c, col.START)
     own = met(wall, touches.listed, touches.spans, c, radius)
@@ -83,14 +83,14 @@ def faced(wall, grains, touches, c, i, move):
 
 @outlined
 def rub_wall(matter, law, wall, grains, touches, number, sweep):
-    """Improve the impulse and the friction of each ball at a wall; the largest changes, as for pairs."""
+    """Improve the impulse and the friction of each ball at a wall; return the largest changes, as for pairs."""
     rows, speed, spin, half = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h
     worst, pressed_worst = 0.0, 0.0
     begin, share = touches.wall_spans[0, number], sweep.share
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        # One with a mass is moved by the contacts of other balls.
+        # The contacts of other balls also move a wall with a mass.
         if not is_heavy(wall) and not is_due(sweep, touches.stirred, i):
             continue
         radius, ease, w = grains.place[i, col.RADIUS], rows[c, col.EASE], vector_at(spin, i, col.AFTER)
@@ -129,7 +129,7 @@ def twist_wall(matter, wall, grains, touches, number):
 
 @outlined
 def book_rubbing(matter, wall, grains, near, touches, books, number):
-    """Book what friction takes of balls at a wall, what the wall gives by it, and keep it."""
+    """Book the energy that friction at a wall takes from balls, and the work of the wall; keep its impulse."""
     rows, speed, spin, half = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h
     begin = touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):

@@ -26,9 +26,9 @@ def _ease(place, i):
 
 
 def _resist(contact, rolling, sizes, sweep):
-    """The change of the angular impulse of a contact, and the error: of the rolling at the end of the step.
+    """Improve the angular impulse of a contact by the rolling at the end of the step; return the change, and the error.
 
-    `sizes` are the radius R and 1/I.
+    `rolling` is the relative angular velocity and the coefficient, `sizes` the radius R and 1/I.
     """
     (radius, ease), n, roll = sizes, contact.vector(col.IMPULSE), contact.vector(col.ROLL)
     if not square(n) > 0.0:
@@ -45,7 +45,7 @@ def _resist(contact, rolling, sizes, sweep):
 
 @outlined
 def roll_pairs(matter, grains, touches, sweep):
-    """Improve the angular impulse of each pair in turn; the largest change, relative to what moves there."""
+    """Improve the angular impulse of each pair in turn; return the largest relative change."""
     place, spin, worst = grains.place, grains.spin, 0.0
     for g in range(touches.used[1]):
         for k in range(touches.lanes[index(g)]):
@@ -77,7 +77,7 @@ def turn_pairs(grains, touches):
 
 @outlined
 def book_rolling_pairs(grains, near, touches, books):
-    """Book what the resistance takes of pairs, and keep its angular impulses for the next step."""
+    """Book the energy that the resistance takes from pairs; keep its angular impulses for the next step."""
     spin = grains.spin
     for g in range(touches.used[1]):
         for k in range(touches.lanes[index(g)]):
@@ -103,7 +103,7 @@ def _spin_of(wall, grains, touches, c, i):
 
 @outlined
 def roll_wall(law, wall, grains, touches, number, sweep):
-    """Improve the angular impulse of each ball at a wall; the largest change, as for pairs."""
+    """Improve the angular impulse of each ball at a wall; return the largest relative change."""
     rows, place, spin, begin, worst = touches.wall_rows, grains.place, grains.spin, touches.wall_spans[0, number], 0.0
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
@@ -130,7 +130,7 @@ def turn_wall(grains, touches, number):
 
 @outlined
 def book_rolling(wall, grains, near, touches, books, number):
-    """Book what the resistance takes of balls at a wall, what the wall gives by it, and keep it."""
+    """Book the energy that the resistance at a wall takes from balls, and the work of the wall; keep its impulse."""
     rows, spin, begin = touches.wall_rows, grains.spin, touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)

@@ -1,8 +1,8 @@
-"""The laws of walls with soft balls: they act where a contact ends.
+"""The laws of walls with soft balls: a law acts when a contact ends.
 
-The dampers and the friction of a contact have turned round the normal velocity of a ball by then. Temperatures and
-`laws` make of that what they make of a rigid impact at which the ball arrives with the mirrored velocity: without
-losses that is what `Impact` gives, whatever the penalty. They act on the centre, and the ball keeps its spin.
+By then the contact, with its damper and its friction, has reversed the normal velocity of the ball. Temperatures and
+`laws` treat the end of the contact as a rigid impact at which the ball arrives with the mirrored velocity: without
+losses the result is that of `Impact`, whatever the penalty. They act on the centre, and the ball keeps its spin.
 """
 
 import math
@@ -27,11 +27,11 @@ from .vessel import gives_work, met, met_member
 
 
 class Sender(NamedTuple):
-    """What laws of walls need besides the walls."""
+    """The laws of walls, and the arrays that they need besides the walls."""
 
     laws: Any  # `Laws` without restitution and friction, which act during a contact
     source: RandomSource
-    places: Any  # of each wall, of each member its wall in the laws, (members,) int64
+    places: Any  # for each wall an array (members,) int64: the number of each member among the walls of the laws
 
 
 class _Facing(Record):
@@ -51,9 +51,10 @@ class _Facing(Record):
 
 @outlined
 def send_off(matter, wall, world, given_time):
-    """Let the laws of a wall act on the balls with a contact that has ended in the step, which is done: the `Status`.
+    """Let the laws of a wall act on the balls with contacts that have ended in the step; return the `Status`.
 
-    LEASE_ENDED where it has absorbed any. `given_time` is the number of the wall, and the time [s].
+    The step is done. The `Status` is LEASE_ENDED if the wall has absorbed a ball. `given_time` is the number of the
+    wall, and the time [s].
     """
     grains, touches, (number, time) = world.grains, world.touches, given_time
     rows, begin, half, status = touches.wall_rows, touches.wall_spans[0, number], 0.5 * matter.h, Status.DONE.value
@@ -71,7 +72,7 @@ def send_off(matter, wall, world, given_time):
 
 
 def _act(wall, own, world, at, time):
-    """Let the laws of a wall act on a ball."""
+    """Let the laws of a wall act on a ball; return the `Status`."""
     (number, c, i), grains, books, sender = at, world.grains, world.books, world.sender
     place, v = grains.place, vector_at(grains.speed, i, col.BEFORE)
     r, radius = vector_at(place, i, col.X), place[i, col.RADIUS]
@@ -82,7 +83,7 @@ def _act(wall, own, world, at, time):
         u = own.velocity(r + radius * n) if isinstance(own, Posed) else ZERO
     away = -dot(v if u is None else v - u, n)
     if not away > 0.0:
-        # Another one has pushed it back, or a law.
+        # Another contact, or a law, has pushed the ball back.
         return Status.DONE.value
     one, touches = index(grains.number[i]), world.touches
     member = sender.places[number][index(met_member(wall, touches.listed, touches.spans, c, radius, r))]
