@@ -1,4 +1,4 @@
-"""The windows of a run of balls: spans of time in which its walls have one description, whatever the frames are."""
+"""The windows of a run of balls: spans of time, independent of frames, in which its walls have one description."""
 
 from typing import Any
 
@@ -12,10 +12,10 @@ from .reacting.described import scenery_of
 
 
 class Windows:
-    """The windows of a scene with walls that move, come or go: each is an epoch, or a part of one between two instants.
+    """The windows of a scene with walls that move or become absent: epochs, or parts of epochs between two instants.
 
     Attributes:
-        numbers: of the window, as kernels take them.
+        numbers: the array of the window, as kernels take it.
     """
 
     def __init__(self, compiled: CompiledScene, clock: Floats) -> None:
@@ -28,17 +28,17 @@ class Windows:
         return bool(self.numbers[END] == self._clock[LENGTH])
 
     def instant(self) -> float | None:
-        """The instant at which the window ends [s], if that is why it does."""
+        """The instant at which the window ends [s], or None if it ends with the epoch."""
         passed = int(self.numbers[PASSED])
         return self._instants[passed - 1] if passed and self._instants[passed - 1] == self.numbers[MOMENT] else None
 
     def begin(self, now: float) -> None:
-        """The window that begins at a time of the epoch [s]."""
+        """Begin a window at a time of the epoch [s]."""
         epochs, length = self._clock[EPOCHS], self._clock[LENGTH]
         end, moment, passed = length, (epochs + 1.0) * length, int(self.numbers[PASSED])
         if passed < len(self._instants) and self._instants[passed] <= moment:
             moment = self._instants[passed]
-            # By round-off none is without length.
+            # The instant may be after the end of the epoch by round-off.
             end = min(moment - epochs * length, length)
             passed += 1
         self.numbers[:] = end, end - now, passed, moment
@@ -50,17 +50,17 @@ class Windows:
         return scenery_of(compiled, moment).given if compiled.scene.reacts() else compiled.walls(moment)
 
     def openings(self) -> Any:
-        """The openings in it of the walls that have no mass."""
+        """The openings in this window of the walls without a mass."""
         moment, compiled = float(self.numbers[MOMENT]), self._compiled
         return scenery_of(compiled, moment).openings if compiled.scene.reacts() else compiled.openings(moment)
 
     def reacting(self) -> Any:
-        """The walls in it that have a mass."""
+        """The walls with a mass in this window."""
         return scenery_of(self._compiled, float(self.numbers[MOMENT])).reacting
 
 
 def windows_of(compiled: CompiledScene, clock: Floats) -> Windows | None:
-    """The windows of a scene, None where its walls are always the same."""
+    """Return the windows of a scene, None if its walls never change."""
     scene = compiled.scene
     moves = scene.moves()
     if scene.reacts():

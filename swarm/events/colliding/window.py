@@ -1,6 +1,6 @@
-"""Walls that move, come and go: what is known of them until the end of a window, and when balls meet them until then.
+"""Walls that move or become absent: their description in a window, and the hits of balls on them in it.
 
-From one window to the next, which are no frames, all balls look for their next wall again.
+Windows are no frames. At the start of each window, all balls look for their next wall again.
 """
 
 import math
@@ -14,20 +14,21 @@ from ...surfaces.time_of_impact.flights import Hit
 from ...surfaces.time_of_impact.rising import flight_of
 from .rows import FLOATS, LEAVES
 
-# Of a window: its end and its length [s since the epoch], how many instants there were before its end, that end [s].
+# Entries of a window: its end [s of the epoch] and its length [s], the number of instants up to its end, its end [s].
 END, SPAN, PASSED, MOMENT, WINDOW = 0, 1, 2, 3, 4
-# No wall is known yet; the ball is no more among the walls; from this number on downwards a wall holds it.
+# In place of the number of a wall: no wall is known yet; the ball has left the walls; from `HELD` on downwards a wall
+# holds the ball.
 UNKNOWN, OUT, HELD = -2.0, -3.0, -4.0
 
 
 def walls_at(box, i, now):
-    """The walls that the centre of a ball meets, at a time."""
+    """The walls that the centre of a ball meets at a time."""
     walls = box.walls.grown(box.kinds.radius_of(i))
     return walls if box.window is None else walls.at(box.window[END] - now)
 
 
 def next_hit(box, flock, i, now):
-    """When a ball meets a wall next; of walls that move only before it leaves its cell and before the window ends."""
+    """Return the next `Hit` of a ball on a wall; if walls move, only before the ends of its cell and of the window."""
     r, v = flock.at(box.pull, i, now)
     if box.window is None:
         return flights.first_hit(box.walls.grown(box.kinds.radius_of(i)), box.pull, r, v)
@@ -40,7 +41,7 @@ def next_hit(box, flock, i, now):
 
 @outlined
 def _hit_before(walls, gravity, r, v, remaining, longest):
-    """The first `Hit` of a flight before a time, with so much of the window left."""
+    """Return the first `Hit` of a flight within `longest` [s], with `remaining` [s] of the window left."""
     found = safe.closed_hit(walls.at(remaining), gravity, r, v)
     if walls.accelerate:
         soonest = min(found.time, longest)
@@ -59,7 +60,7 @@ def middle_of(box):
 
 
 def swept(wall, r, half):
-    """A bound of how much nearer to a place a wall may come within a time."""
+    """A bound of the way of a wall towards a place within a time `half` [s]."""
     way: Any = 0.0
     if half is not None and isinstance(wall, Posed):
         drive = wall.drive
