@@ -281,7 +281,7 @@ def predict(scenery, freedoms, queue, clock, rule, first, last):
 
 @long_kernel
 def arrive(scenery, queue, rule, first, last):
-    """Bring particles from `first` to before `last` to the end of the frame; return where the log is full, or `last`."""
+    """Bring particles from `first` to before `last` to the frame's end; return where the log is full, or `last`."""
     for k in range(first, last):
         if is_full(queue.watchers.log):
             return k
