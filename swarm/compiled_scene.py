@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 MOST_WALLS = 24
 # The `apart` of a scene in which impacts move a wall: each listed solid is a wall.
 REACTING = "walls that react"
-# The `apart` of a method that cuts its steps at impacts: the same, but a field keeps its members.
+# The `apart` of a method that cuts its steps at impacts: each listed solid is a wall, and a field keeps its members.
 CUT = "steps that are cut at impacts"
 # The law of a wall without temperature.
 _NO_HEAT = Thermal(0.0, 0.0)
 
 
 class PartsOfRows(NamedTuple):
-    """The part of each row, which is `number` where its surface has no parts; and the number of parts."""
+    """The part of each row, or `number` if its surface has no parts, and the number of parts."""
 
     rows: tuple[int, ...]
     number: int
@@ -97,7 +97,7 @@ class Numbering:
 
 
 def is_in_steps(apart: str | None) -> bool:
-    """Whether a method with this `apart` goes by steps, which may end outside of walls and of a cell."""
+    """Whether a method with this `apart` has steps, which may end outside of walls and of a cell."""
     return apart is not None and apart != REACTING
 
 
@@ -106,14 +106,14 @@ class CompiledScene:
 
     Args:
         scene: the description.
-        largest: the largest radius of the balls in the scene [m]; None: its particles are points.
+        largest: the largest radius of the balls in the scene [m]; None: the particles are points.
         apart: the method that does not take listed solids of one kind as a field, in words for errors; None: more than
-            a few of them are a field.
+            a few such solids are a field.
 
     Attributes:
         scene, largest: as the arguments.
         pieces: the pieces that the particles meet.
-        order: their numbers in the order of the walls.
+        order: the numbers of the pieces in the order of the walls.
 
     Raises:
         SceneError: there are more walls than kernels can be compiled for.
@@ -121,7 +121,7 @@ class CompiledScene:
 
     def __init__(self, scene: "Scene", largest: float | None = None, apart: str | None = None) -> None:
         self.scene, self.largest, self._apart = scene, largest, apart
-        # The walls where nothing moves, by which of the pieces are there.
+        # The walls of a scene without motion, by which of the pieces are present.
         self._known: dict[tuple[bool, ...], Walls] = {}
         in_steps = largest is None and is_in_steps(apart)
         reach = scene.reach_of_steps() if in_steps else largest
@@ -146,7 +146,7 @@ class CompiledScene:
         return CompiledScene, (self.scene, self.largest, self._apart)
 
     def of_balls(self, largest: float) -> "CompiledScene":
-        """The same for balls with radii up to the largest one [m]."""
+        """Return the compiled scene for balls with radii up to `largest` [m]."""
         return CompiledScene(self.scene, largest, self._apart)
 
     @cached_property
@@ -160,7 +160,7 @@ class CompiledScene:
 
     @cached_property
     def laws(self) -> Laws | None:
-        """The laws of every wall, None where no surface has one."""
+        """The laws of every wall; None if no surface has a law."""
         runs: list[tuple[int, Surface, int]] = []
         for i, walls in self._spans:
             piece = self.pieces.each[i]
@@ -182,19 +182,19 @@ class CompiledScene:
         return [surface for surface, walls in runs for _wall in range(walls)]
 
     def openings(self, moment: float = 0.0, some: list[tuple[int, int]] | None = None) -> tuple[Opened, ...] | None:
-        """The openings of the walls in the frame that ends at a moment [s], or None.
+        """Return the openings of the walls in the frame that ends at a moment [s], or None.
 
-        They are those of all walls, or of `some`, consecutive ones: (piece, number of walls) each.
+        They are the openings of all walls, or of `some` consecutive walls: (piece, number of walls) each.
         """
         spans, volumes, doorways = self._spans if some is None else some, self.pieces.volumes, self.pieces.doorways
         if self.largest is None:
             return openings_in(spans, (volumes, doorways), moment) or None
-        # Balls meet a union as one surface, so doors between its rooms open nothing; files still have times of escapes.
+        # Balls meet a union as one surface, so doors between its rooms open nothing; files still have escape times.
         made = openings_in(spans, (volumes, ((),) * len(volumes)), moment)
         return made if made or any(doorways) else None
 
     def walls(self, moment: float = 0.0) -> Walls:
-        """The walls by their kinds, in the frame, or the piece of one, that ends at a moment [s]."""
+        """Return the walls by their kinds, in the frame, or the piece of a frame, that ends at a moment [s]."""
         if self.scene.moves():
             return self._made(moment)
         there = tuple(was_there(piece.present, moment) for piece in self.pieces.each)
@@ -203,7 +203,7 @@ class CompiledScene:
         return self._known[there]
 
     def walls_of_bodies(self, own: Sequence[Surface], moment: float = 0.0) -> Walls:
-        """The walls for bodies at a moment [s]: those of `walls`, then those of the surfaces of a body, at rest."""
+        """Return the walls for bodies at a moment [s]: the walls of the scene, then the surfaces of a body, at rest."""
         return self._made(moment, own)
 
     @cached_property
@@ -215,7 +215,7 @@ class CompiledScene:
         return None if made is None else made.compiled(self.largest, REACTING)
 
     def cell(self) -> Period | None:
-        """The cell that repeats."""
+        """Return the periodic cell, or None."""
         period, gravity = self.scene.period, self.scene.gravity
         if period is None:
             return None
