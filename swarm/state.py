@@ -32,7 +32,7 @@ class Contacts(NamedTuple):
     """The lasting contacts of each particle, for methods in which a particle may slide.
 
     Attributes:
-        phase: (N,) int8, the state at the start of the next frame: in flight, along one or two walls, at rest (ARRIVED).
+        phase: (N,) int8, the state at the start of a frame: in flight, along one or two walls, or at rest (ARRIVED).
         walls: (2, N) the numbers of the walls that hold the particle; -1 for no wall. Two walls are an edge.
         met: (N,) the wall at which the next phase of the particle is to be decided.
         step: (N,) the next sliding step [s]; 0 if the walls decide.
