@@ -294,14 +294,13 @@ class _Loop:
 
     def _strike(self, i, hit):
         """The impact of a ball; False where round-off decides of it, or is large in it."""
-        # A ball that is back at a wall, or met another ball, within the contact duration is in a contact that may last.
-        if not hit[2] or hit[0] - self.met[i] < self.duration:
+        # A ball that is back at a wall as soon as that is in a contact that may last.
+        if not hit[2]:
             return False
         time, wall, _clear = hit
         self._move(i, time)
         here, turn, u = self._as_given(wall, self.r[i], time)
-        n, e = turn @ wall.normal(here), self.number(wall.e)
-        self.met[i] = time
+        n, e = turn @ wall.normal(here), self._restitution(self.number(wall.e), i)
         b = (self.v[i] - u) @ n
         if b < SLOW * self._length(self.v[i] - u):
             return False
@@ -315,7 +314,7 @@ class _Loop:
         return True
 
     def _restitution(self, e, *balls):
-        """Of an impact of balls; a ball that met anything within the contact duration before keeps its energy."""
+        """Of an impact of balls; a ball that met another one within the contact duration before keeps its energy."""
         recent = max(self.met[k] for k in balls)
         return self.number(1) if self.now - recent < self.duration else e
 
