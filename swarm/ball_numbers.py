@@ -17,7 +17,7 @@ _LAST = "time", "collisions", "virial", "kinetic", "action", "collision_rate", "
 
 
 def inertias(mass: Floats, radius: Floats) -> Floats:
-    """The moments of inertia of balls [kg m^2], (N,)."""
+    """The moments of inertia of balls (N,) [kg m^2]."""
     return np.asarray(INERTIA * mass * radius * radius)
 
 

@@ -28,7 +28,7 @@ from .surfaces.walls import Field, Listed, Walls, all_walls
 if TYPE_CHECKING:
     from .scene import Scene
 
-# The most walls that kernels are compiled for: with `contact_step` this many take three minutes.
+# The most walls for which kernels are compiled: with `contact_step` this number takes three minutes.
 MOST_WALLS = 24
 # The `apart` of a scene in which impacts move a wall: each listed solid is a wall.
 REACTING = "walls that react"
@@ -48,20 +48,20 @@ class PartsOfRows(NamedTuple):
 class Numbering:
     """The numberings of walls, and all translations among them.
 
-    | number | what is counted | in the order of |
+    | number | counted things | in the order of |
     | --- | --- | --- |
-    | surface | what the user listed in `Scene.surfaces` | the user |
+    | surface | the entries of `Scene.surfaces` | the user |
     | part | the simple parts of unions and intersections, `Scene.parts` | surfaces |
     | piece | simple surfaces, `Pieces.each`: a surface or a part, or an image of one | surfaces, images, parts |
-    | row | what impulses and heat are summed for: a wall, or a field with all its members | walls |
-    | wall | what a flight meets; of a field each of its members | kinds: fields, groups, others, unions |
+    | row | the units of impulses and heat: a wall, or a field with all its members | walls |
+    | wall | the walls that a flight meets, each member of a field | kinds: fields, groups, others, unions |
 
     A wall belongs to one row, a row to one piece, and a piece to one surface and at most one part.
 
     Attributes:
         pieces_of_rows: the piece of each row, (rows,).
         surfaces_of_rows: the surface of each row.
-        parts_of_rows: the part of each row; None where no surface has parts.
+        parts_of_rows: the part of each row; None if no surface has parts.
         pieces_of_walls, rows_of_walls: the piece and the row of each wall, (walls,).
         members: the surface of each wall, and its number in a field, else its part, else -1: (2, walls).
     """
@@ -89,7 +89,7 @@ class Numbering:
             first += count
 
     def split(self, values: NDArray[Any]) -> list[NDArray[Any]]:
-        """The values of the members of each surface, from (..., members) of all surfaces one after the other."""
+        """Return the values of the members of each surface, from (..., members) of all surfaces in order."""
         surface, member = self.members
         counts = np.zeros(int(surface.max()) + 1, np.int64)
         np.maximum.at(counts, surface, member + 1)
@@ -177,7 +177,7 @@ class CompiledScene:
         return None if laws == NONE else laws.in_plane(self.scene.across())
 
     def lawful(self) -> list[Surface]:
-        """The surface that has the laws, for each wall."""
+        """Return the surface with the laws of each wall."""
         runs = [run for i, walls in self._spans for run in self.pieces.each[i].runs(walls)]
         return [surface for surface, walls in runs for _wall in range(walls)]
 
@@ -208,7 +208,7 @@ class CompiledScene:
 
     @cached_property
     def of_no_mass(self) -> "CompiledScene | None":
-        """The scene of the surfaces that impacts do not move; None where impacts move all of them."""
+        """The scene of the surfaces that impacts do not move; None if impacts move all surfaces."""
         scene = self.scene
         rest = [surface for surface in scene.surfaces if not surface.reacts()]
         made = type(scene)(rest, scene.gravity, plane=scene.plane) if rest else None
@@ -225,18 +225,18 @@ class CompiledScene:
         return cell_in(period, self.scene.surfaces, has_fields, fall, self.largest or 0.0)
 
     def fields(self) -> list[int]:
-        """The surfaces that are many bodies."""
+        """Return the numbers of the surfaces that are fields."""
         return [self.pieces.owners[i] for i in self.order.fields]
 
     def unions(self) -> list[int]:
-        """The surfaces that are unions of several rooms."""
+        """Return the numbers of the surfaces that are unions of several rooms."""
         return [self.pieces.owners[rooms[0][0]] for rooms in self.order.unions]
 
     # --- Walls ---------------------------------------------------------------------------------------
 
     @cached_property
     def _groups(self) -> list[Members]:
-        """The listed solids that are fields."""
+        """The groups of listed solids that are fields."""
         repeated = None if self.scene.period is None else corners_of(self.scene.period)
         return [members_of(self._pieces_at(group), repeated, self.largest) for group in self.order.groups]
 
@@ -244,7 +244,7 @@ class CompiledScene:
         return [self.pieces.each[i] for i in numbers]
 
     def _made(self, moment: float, own: Sequence[Surface] | None = None) -> Walls:
-        """The walls for particles or, with the surfaces of a body, for bodies."""
+        """Return the walls for particles or, with the surfaces of a body, for bodies."""
         scene, order, fields = self.scene, self.order, self._pieces_at(self.order.fields)
         straight = scene.gravity is None and own is None
 
@@ -270,14 +270,14 @@ class CompiledScene:
 
 
 def _of_walls(values: list[Any], spans: list[tuple[int, int]], neutral: Any) -> tuple[Any, ...] | None:
-    """The value of every wall, from values and spans (value, number of walls); None where all are neutral."""
+    """Return the value of every wall, from values and spans (value, number of walls); None if all are neutral."""
     if all(value == neutral for value in values):
         return None
     return tuple(values[k] if walls == 1 else Span(values[k], float(walls)) for k, walls in spans)
 
 
 def _thermal(surface: Surface) -> Thermal:
-    """The temperature and the accommodation of a surface, for kernels."""
+    """Return the temperature and the accommodation of a surface, for kernels."""
     if surface.temperature is None:
         return _NO_HEAT
     return Thermal(surface.temperature, surface.accommodation)

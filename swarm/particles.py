@@ -54,7 +54,7 @@ class Particles:
     """
 
     _volume: VolumeEstimate | Callable[[], VolumeEstimate] | None = None
-    # The births of the particles in a run with sources.
+    # The births, in a run with sources.
     births: "Births | None" = None
 
     def __init__(

@@ -146,7 +146,7 @@ class Scene:
         return {name: value for name, value in self.__dict__.items() if name not in ("_of_points", "_pieces_by_radius")}
 
     def _require_alone(self) -> None:
-        """Raise a `SceneError` where a foam is not the only surface, or has a period."""
+        """Raise a `SceneError` if a foam is not the only surface, or the scene has a period."""
         foams = [i for i, one in enumerate(self.surfaces) if one.is_foam()]
         if foams and (len(self.surfaces) > 1 or self.period is not None):
             raise SceneError(
@@ -274,7 +274,7 @@ class Scene:
         images = [image for images in self.pieces.images for image in images]
         if not any(len(one.rooms) > 1 or one.is_foam() for one in images):
             return self.pieces
-        from .surfaces.balls.joined_rooms import joined_rooms_of  # loaded where balls are
+        from .surfaces.balls.joined_rooms import joined_rooms_of  # loaded only for balls
 
         return pieces_of([joined_rooms_of(one) if len(one.rooms) > 1 or one.is_foam() else one for one in images], None)
 

@@ -151,12 +151,12 @@ class State(NamedTuple):
     escape_time: Floats | None = None  # (N,) the time at which each passed an opening [s], NaN for particles inside
     openings: Any = None  # None, or each `Opening` of the walls
     # If particles are born during the run, or wait on a wall:
-    starts: Floats | None = None  # (N,) the time from which each flies [s]
+    starts: Floats | None = None  # (N,) the time from which each particle flies [s]
     # If a wall may absorb particles, as in `Absorbed`:
     absorbed_time: Floats | None = None
     absorbed_wall: NDArray[np.int32] | None = None
 
-    crossed: Crossed | None = None  # where there are counters
+    crossed: Crossed | None = None  # if the run has counters
     # If balls are born during the run:
     born_time: Floats | None = None  # (N,) the time of birth [s], NaN before it
     balls: Balls | None = None  # if particles have a radius

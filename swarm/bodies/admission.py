@@ -70,7 +70,7 @@ def task_of(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -
 
 
 def _require_steps(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> None:
-    """Raise a `SceneError` where a step of soft bodies does not fit the scene or the frames."""
+    """Raise a `SceneError` if a step of soft bodies does not fit the scene or the frames."""
     if not isinstance(method, Penalty):
         return
     if len(bodies.body.contacts):
@@ -111,7 +111,7 @@ def _warn_of_turns(bodies: Bodies, dt: float) -> None:
 
 
 def warn_of_passing(scene: Scene, body: Body) -> None:
-    """Warn where a solid can enter a face of the body, or pass it, without touching a contact point."""
+    """Warn if a solid can enter a face of the body, or pass through it, without touching a contact point."""
     solids = [(i, surface) for i, surface in enumerate(scene.surfaces) if _is_solid(surface)]
     if not solids or not len(body.faces):
         return

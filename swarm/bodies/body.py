@@ -82,14 +82,14 @@ class Body:
 
     Args:
         points: (P, 3) base points in the body at rest [m].
-        mass: one number or (P,) [kg], above 0; or
+        mass: one number or (P,) [kg], above 0; either this or `mass_matrix` is given.
         mass_matrix: (P, P) [kg], symmetric and positive definite.
         links: pairs (i, j) of points at a distance that never changes; no link may follow from the others.
         springs: (i, j, stiffness above 0 [N/m], rest length 0 or more [m]).
         contacts: the points that can touch a wall: numbers of points, or rows (K, P) of coefficients that add up to 1;
             None: every point that is not anchored.
         strain: elastic energy of edges, as `elastic` makes it.
-        anchors: number of a point -> None, fixed in space, or a Translation, Oscillation or Rotation that leads it.
+        anchors: number of a point -> None for a fixed point, or a Translation, Oscillation or Rotation that leads it.
         guides: (number of a point, surface without edges): the point starts and stays on the surface.
         cavities: (surface without edges, carrier, point): the surface moves with the point `carrier`, its origin, and
             keeps `point` on its admissible side.

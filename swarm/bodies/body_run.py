@@ -239,7 +239,7 @@ class BodyRun(BaseRun):
     def _share_done(self, span: float) -> float:
         return float((1.0 - self._bodies.remaining / (span * self._unit)).mean())
 
-    # --- What is observed --------------------------------------------------------------------------------
+    # --- Observation -------------------------------------------------------------------------------------
 
     def _blocks(self) -> Iterator[tuple[Any, Floats, Floats]]:
         """Yield the bodies by chunks: their numbers, positions and velocities.
@@ -281,7 +281,7 @@ class BodyRun(BaseRun):
             self.state.escape_time[:] = np.tile(bodies.escape_time, len(self._body))
         if self.state.absorbed_time is not None:
             self.state.absorbed_time[:] = np.tile(bodies.absorbed_time, len(self._body))
-            # A body counts once.
+            # A body counts as one, not as its points.
             self.state.absorbed_wall[: len(bodies.absorbed_wall)] = bodies.absorbed_wall  # type: ignore[index]
         if self.state.image is not None:
             self.state.image[:] = np.tile(bodies.image, len(self._body))
@@ -306,7 +306,7 @@ class BodyRun(BaseRun):
             self._seen["sweeps"] = int(bodies.sweeps.sum())
 
     def _counted(self) -> int:
-        """The number of counters."""
+        """Return the number of counters."""
         return 0 if self._counters is None else len(self._counters.each)
 
     def _sums_of(self, some: Any, r: Floats, v: Floats, moment: float) -> tuple[list[float], float, float]:

@@ -32,7 +32,7 @@ class Bodies(TiedParticles):
     """n copies of a body.
 
     Args:
-        body: the template. An anchored point of a copy is fixed, or led from, where that copy has it.
+        body: the template. An anchored point of a copy is fixed at its place in the copy, or led from there.
         position: (3, P, n), or (3, P) for one copy [m], rows x, y, z of every point; links have their lengths.
         velocity: in the shape of `position` [m/s]. The points of a link have the same velocity along it; a guided point
             has none across its guide; an anchored point has that of its path at the start, or 0, which stands for it.

@@ -73,7 +73,7 @@ def block(lengths: Sequence[float], cells: Sequence[int]) -> tuple[Floats, Pairs
     """Return tetrahedra that fill a rectangular block: six in each cell, around the same diagonal, so that they match.
 
     Args:
-        lengths: three numbers above 0, the whole block's edges along x, y, z [m].
+        lengths: three numbers above 0, the edges of the whole block along x, y, z [m].
         cells: three numbers of cells along x, y, z, 1 or more.
 
     Returns:

@@ -93,7 +93,7 @@ def most_contacts_of(touching: Touching, walls: Soft | None) -> int:
 
 
 def own_surfaces(body: Body) -> list[Surface]:
-    """The surfaces of its guides and cavities."""
+    """Return the surfaces of the guides and cavities of a body."""
     return [surface for _point, surface in body.guides] + [surface for surface, _carrier, _point in body.cavities]
 
 

@@ -14,7 +14,7 @@ from .copies import Bodies
 
 # The number of points that are tested together.
 _BATCH = 1 << 19
-# The search ends after this many points if fewer than one body in a million was admissible.
+# The number of points after which the search ends if fewer than one body in a million was admissible.
 _TRIES = 20_000_000
 # The points of each side and link that must be out of solids, as a solid may be between corners.
 _SAMPLES = 8
@@ -29,7 +29,7 @@ def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float =
 
     Args:
         scene: its volume must be bounded.
-        body: without anchors, guides and cavities.
+        body: a body without anchors, guides and cavities.
         n: number of copies, 1 or more.
         speed: |v| of every centre of mass [m/s], from 0 to 1e100, in a direction uniform on the sphere.
         spin: |omega| of every copy [rad/s], from 0 to 1e100, about its centre of mass and an axis uniform on the

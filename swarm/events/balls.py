@@ -21,12 +21,12 @@ _ROUND_OFF = 64.0 * np.finfo(np.float64).eps
 # Balls that touch walls are moved by the part `_MOVED` of that coordinate, to find the walls that stop them; `_STEP` is
 # the relative step of the differences of their distances.
 _MOVED, _STEP = 1e-6, 1e-7
-# Walls face each other where the cosine of the angle between their normals is less than this above -1.
+# Walls face each other if the cosine of the angle between their normals is less than this above -1.
 _FACING = 1e-6
 
 
 def require_balls(scene: Scene, particles: Particles, method: Method) -> None:
-    """Raise a `SceneError` where balls do not fit the scene, the cell or the steps.
+    """Raise a `SceneError` if balls do not fit the scene, the cell or the steps.
 
     Balls without a spin get a spin of 0 where contacts turn them. Only friction of pairs turns rigid balls without a
     spin: walls act on them as on points.
@@ -58,7 +58,7 @@ def _require_cell(scene: Scene, particles: Particles, method: Method) -> None:
 
 
 def require_apart(scene: Scene, particles: Particles, method: Method) -> None:
-    """Raise a `SceneError` where balls overlap one another, or are outside their walls, at the start."""
+    """Raise a `SceneError` if balls overlap one another, or are outside their walls, at the start."""
     radius = particles.radius
     assert radius is not None
     magnitude = max(float(np.abs(particles.position).max()), scene.finite_size())

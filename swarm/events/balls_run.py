@@ -101,7 +101,7 @@ class CollidingRun(BaseRun):
         return True
 
     def _every_laws(self, compiled: CompiledScene, box: Any) -> list[Laws]:
-        """The laws of all walls."""
+        """Return the laws of all walls."""
         return [box.laws]
 
     def _with_heavy(self, compiled: CompiledScene, box: Any) -> Any:

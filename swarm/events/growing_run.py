@@ -65,7 +65,7 @@ class Growth(Record):
         closing = dot(b, u) - touching2 * scale * self.rate
         gap = square(b) - touching2 * scale * scale
         faster = square(u) - touching2 * self.rate * self.rate
-        # A ball is among those that are tested against it.
+        # A ball is also tested against itself.
         return GrowingSight(closing, gap, select(square(b) > 0.0, closing * closing - faster * gap, -1.0))
 
     def turned(self, u, n, closing, distance2, now):

@@ -45,7 +45,7 @@ def pack(
     temperature: float | None = None,
     mass: ArrayLike = 1.0,
 ) -> Particles:
-    """Balls that fill a part of the admissible volume of a scene, up to 0.6 of it, in a plane 0.8.
+    """Return balls that fill a part of the admissible volume of a scene, up to 0.6 of it, in a plane 0.8.
 
     The balls begin smaller at random places, as in `fill`. They grow while they fly and collide within the walls at
     0 s (the method of Lubachevsky and Stillinger). Their places are random but not in equilibrium: let the balls fly

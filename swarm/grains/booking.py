@@ -42,7 +42,7 @@ class ContactTotals(NamedTuple):
     overlap: Array  # (1,) the largest overlap since the frame before [m]
     failed: Array  # (4,) the failure of a refused step, see overlaps.py
     escape_time: Any = None  # (N,) [s], of a scene with openings
-    # Where walls send balls off:
+    # If walls send balls off:
     heat: Any = None  # (walls, N) [J]
     ended: Any = None  # (N,) int64, ended contacts with walls, the counter of the random numbers
     absorbed_time: Any = None  # (N,) [s], with the number of the wall, where a law absorbs balls
@@ -146,7 +146,7 @@ def book_wall(matter, law, wall, grains, touches, books, number):
         books.impulse[index(number), one] += norm(impulse)
         work = dot(impulse, move)
         if gives_work(wall):
-            # The work of the wall is what the ball gains and the contact stores or loses.
+            # The work of the wall is the energy that the ball gains and the contact stores or loses.
             given = work + push * way.change
             give_work(books, index(number), one, given / matter.h)
             work = work - given

@@ -26,8 +26,8 @@ _BELOW_ROUND_OFF = 2e-6
 # The weight of a change of an impulse where a damper acts: the energy that the damper takes is booked from the impulse
 # as it is, so that an error in it loses none.
 _DAMPED = 1e-6
-# The margin is `_WIDER` times what the step before would have needed, and is relied on up to its part `_SURE`, so that
-# round-off decides nothing. It is for speed alone.
+# The margin is `_WIDER` times the one that the step before would have needed. It is relied on up to its part `_SURE`,
+# so that round-off decides nothing. It has no purpose but speed.
 _WIDER, _SURE = 8.0, 0.5
 
 
@@ -71,7 +71,7 @@ class Matter(Record):
 
     @property
     def rolls(self):
-        """Whether any rolling is resisted: a constant for the compiler."""
+        """Whether rolling is resisted at any contact: a constant for the compiler."""
         return any(one.rolling is not None for one in (self.pairs, *self.walls))
 
 
@@ -307,7 +307,7 @@ class Travel(Record):
 
 @outlined
 def travel_of(matter, grains):
-    """The `Travel` of all balls."""
+    """Return the `Travel` of all balls."""
     place, speed, listed, half = grains.place, grains.speed, grains.listed, 0.5 * matter.h
     off, farthest, longest = 0.0, 0.0, 0.0
     for k in range(place.shape[0]):

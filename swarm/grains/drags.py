@@ -26,7 +26,7 @@ class Drags(NamedTuple):
 
 
 def kept_drags(kernel: Any, world: Any) -> Drags | None:
-    """Return what the lists keep of contacts, None if they keep nothing; `kernel` is the method of the `Tier`."""
+    """Return the numbers that lists keep of contacts, or None; `kernel` is the method of the `Tier`."""
     if world.near.drag is None:
         return None
     kept = room_for(world.near)
@@ -55,7 +55,7 @@ def set_drags(kernel: Any, world: Any, kept: Drags | None) -> None:
 
 @long_kernel
 def carry(numbers, near, kept, gives):
-    """Write the kept numbers of contacts that are listed again into new lists, or keep those of contacts that act.
+    """Write the kept numbers of contacts into new lists that have these contacts, or keep the numbers that are not 0.
 
     If `gives`, `numbers` are the rows of the particles, -1 for one that has left; else the particles of the rows.
     """

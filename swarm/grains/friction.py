@@ -5,10 +5,10 @@ twist T = s x J/R turns both balls the same way, I_i (w1 - w0) = -R_i T and I_j 
 s, so that angular momentum is conserved. The slip is u = v_i - v_j - (R_i w_i + R_j w_j) x s/R across s, and with its
 mean over the step friction does the work J.u. At a wall the arm is the radius, and the wall's own velocity counts.
 
-It sticks where an impulse within mu times the normal one leaves no slip at the end of the step: a pile at rest does not
-creep. Else it slides, with that impulse against the slip at the end: against the mean one a contact that turns round
-within a step has no impulse that its neighbours can rely on, and sweeps over dense piles go round in circles. So a
-slip that turns round may gain a little in that step, which is booked as what is lost.
+A contact sticks if an impulse within mu times the normal one leaves no slip at the end of the step: a pile at rest does
+not creep. Else it slides, with mu times the normal impulse against the slip at the end. With the mean slip instead, a
+contact that reverses within a step has no impulse on which its neighbours can rely, and sweeps over dense piles go in
+cycles. So a slip that reverses may gain a little energy in that step, which is booked as a negative loss.
 """
 
 import math

@@ -37,7 +37,7 @@ class FreeMotion(Record):
     lightness: float  # 1/(M (1 + c))
     axis: Any  # of the guide, or None
     spring: Any  # k/M of its spring [1/s^2], or None
-    pull: Any  # its acceleration by gravity, along the axis if there is one, or None
+    pull: Any  # its acceleration by gravity, along the axis of a guide, or None
     h: float  # the step [s]
     place: Array
     speed: Array
@@ -129,7 +129,7 @@ def is_heavy(wall):
     return isinstance(_own(wall), HeavyWall)
 
 
-# --- Of one contact; `own` is what the ball meets --------------------------------------------------------
+# --- Of one contact; `own` is the surface that the ball meets --------------------------------------------
 
 
 def now(own):
@@ -225,7 +225,7 @@ class WallMotion(NamedTuple):
 
 
 def motion_of(heavy: Grains) -> WallMotion:
-    """The `WallMotion` at the end of a step."""
+    """Return the `WallMotion` at the end of a step."""
     return WallMotion(heavy.place[:, col.X : col.X + 3].T, heavy.speed[:, col.BEFORE : col.BEFORE + 3].T)  # type: ignore[arg-type]
 
 

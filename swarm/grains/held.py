@@ -21,10 +21,10 @@ _WHOLE = 1e-6
 
 
 class Held(NamedTuple):
-    """Which balls are held, by the numbers of particles."""
+    """The held balls, by the numbers of particles."""
 
-    until: Array  # (N,) when each leaves [s], NaN where it is not held
-    velocity: Array  # (3, N) with which it leaves [m/s]
+    until: Array  # (N,) the time at which each ball leaves [s], NaN if it is not held
+    velocity: Array  # (3, N) the velocity with which it leaves [m/s]
     spin: Any  # (3, N) [rad/s], None where there is no friction
     mass: Array  # (N,) [kg]
 

@@ -1,7 +1,7 @@
 """The contacts of pairs in groups, one contact a lane; one after the other they take three times as long.
 
 The contacts form slices, each of several parts, and a group has one contact of each part of a slice. So its balls are
-far from one another, while their rows are in the second cache. The numbers of a group are stored by columns, of which
+far from one another, while their rows are in the second cache. The numbers of a group are stored by columns, from which
 LLVM makes vectors: a group is computed by a loop over its lanes that reads from balls, a loop without a branch, and a
 loop that writes to balls, which may be the same. Sweeps go over all groups. A group in which two contacts share a ball
 is done in parts, so that each contact begins with the result of the contacts before it.

@@ -62,7 +62,7 @@ def _losses(alpha: float, given: Pairs | Surface) -> Losses:
 
 
 def require_soft_balls(scene: Scene, particles: Particles, method: Method) -> None:
-    """Raise a `SceneError` where dampers or steps of soft balls are out of range."""
+    """Raise a `SceneError` if dampers or steps of soft balls are out of range."""
     if not isinstance(method, Penalty):
         return
     _require_damping(scene)
@@ -83,7 +83,7 @@ def _require_damping(scene: Scene) -> None:
 
 
 def _require_steps(particles: Particles, method: Penalty) -> None:
-    """Raise a `SceneError` where a step is so long that the fastest ball can jump over another one."""
+    """Raise a `SceneError` if the fastest ball can jump over another ball in a step."""
     radius, velocity = particles.radius, particles.velocity
     assert radius is not None
     if not len(particles):
@@ -101,7 +101,7 @@ def _require_steps(particles: Particles, method: Penalty) -> None:
 
 
 def _warn_of_steps(scene: Scene, particles: Particles, method: Penalty) -> None:
-    """Warn where a step is a large part of a contact."""
+    """Warn if a step is a large part of a contact."""
     if not len(particles):
         return
     lightest, fastest = float(particles.mass.min()), particles.fastest()
@@ -119,7 +119,7 @@ def _warn_of_steps(scene: Scene, particles: Particles, method: Penalty) -> None:
 
 
 def _warn_of_springs(scene: Scene, method: Penalty) -> None:
-    """Warn where a step is a large part of half a period of a wall on a spring."""
+    """Warn if a step is a large part of half a period of a wall on a spring."""
     for i, surface in enumerate(scene.surfaces):
         motion, mass = surface.motion, surface.mass
         if mass is not None and isinstance(motion, Guide) and motion.stiffness > 0.0:

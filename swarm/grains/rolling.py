@@ -1,10 +1,10 @@
 """Resistance to rolling at the contacts of a step.
 
-A contact with the normal impulse J resists the angular velocity w_i - w_j across its normal, or that relative to a
-wall, by an angular impulse of at most rolling R J, with R = R_i R_j/(R_i + R_j), or the radius at a wall. It stops the
-rolling where less is enough, and is opposite for both balls, so that angular momentum is conserved. This is the model
-of a directional constant torque of Zhou, Wright, Yang, Xu & Yu, Physica A 269 (1999) 536-553. With Coulomb's friction
-that holds a ball rolls on a plane with a deceleration of 5/7 rolling G.
+A contact with the normal impulse J resists the angular velocity w_i - w_j across its normal, at a wall the one relative
+to the wall. The angular impulse is at most rolling R J, with R = R_i R_j/(R_i + R_j), at a wall the radius, and at most
+the one that stops the rolling. It is opposite for both balls, so that angular momentum is conserved. This is the model
+of a directional constant torque of Zhou, Wright, Yang, Xu & Yu, Physica A 269 (1999) 536-553. With friction that holds,
+a ball rolls on a plane with a deceleration of 5/7 rolling G.
 """
 
 from ..contact.wall_impact import give_work

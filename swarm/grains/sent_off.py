@@ -35,7 +35,7 @@ class Sender(NamedTuple):
 
 
 class _Facing(Record):
-    """A wall where a contact ends: its outward normal and its velocity, None where no wall moves."""
+    """A wall at the end of a contact: its outward normal, and its velocity or None if no wall moves."""
 
     n: Vec
     u: Any
@@ -76,7 +76,7 @@ def _act(wall, own, world, at, time):
     (number, c, i), grains, books, sender = at, world.grains, world.books, world.sender
     place, v = grains.place, vector_at(grains.speed, i, col.BEFORE)
     r, radius = vector_at(place, i, col.X), place[i, col.RADIUS]
-    # Some normals are of length 1 on the wall alone, and the contact has ended a little off it.
+    # Some normals have the length 1 only on the wall, and the contact has ended a little off it.
     n, u = own.unit_normal(r), None
     n = n * (1.0 / math.sqrt(square(n)))
     if sender.laws.moving is not None:

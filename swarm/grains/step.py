@@ -147,7 +147,7 @@ def _fly(matter, grains):
 
 
 def _gather(matter, walls, world, travel):
-    """Add the contacts at the places foreseen, or those that `Travel` has added; return how many are new."""
+    """Add the contacts at the foreseen places, or the missing ones by a `Travel`; return how many are new."""
     grains, near, touches = world.grains, world.near, world.touches
     known = touches.used[0]
     if travel is None:
@@ -163,7 +163,7 @@ def _gather(matter, walls, world, travel):
 
 
 def _push(matter, walls, world):
-    """Set the velocities at the end of the step from all impulses; those of pairs have been summed."""
+    """Set the velocities at the end of the step from all impulses; impulses of pairs have been summed."""
     grains, touches = world.grains, world.touches
     _fly(matter, grains)
     for k in range(len(walls.each)):

@@ -31,7 +31,7 @@ from .heavy_walls import is_heavy
 class NearestMembers(Smooth):
     """Some members of a field as one wall; phi, the gap, is the distance outside of the nearest member."""
 
-    members: Any  # grown
+    members: Any  # the members, grown by the radius of the ball
     listed: Any  # their numbers, from the first to the one before the stop
     first: Any
     stop: Any

@@ -29,13 +29,13 @@ from .tally import Watched
 from .tiers import Tier
 from .watch import Watch
 
-# A particle this many times the scene's extent away from the origin has escaped from an open scene.
+# The distance from the origin at which a particle has escaped from an open scene, in extents of the scene.
 _FAR = 100.0
-# Beyond this part of the scene's size a particle outside rigid walls is an error; round-off is 1e-15 of it.
+# The part of the size of a scene by which a particle may be outside rigid walls; round-off is 1e-15 of the size.
 OUTSIDE = 1e-9
 # The time between two looks of the caller's thread for an interrupt [s].
 _GLANCE = 0.1
-# With fewer particles than this a kernel ends before another thread is awake.
+# The least number of particles for several threads: with fewer, a kernel ends before another thread is awake.
 _FEW = 4096
 # The particles between two looks at the halt, compiled and in plain Python: some 0.1 s of work.
 _AT_ONCE, _AT_ONCE_PLAIN = 1 << 16, 8
@@ -72,7 +72,7 @@ class BaseRun:
     _feed: Feed | None = None
     # The reacting walls as observed, or None.
     _observed: Observed | None = None
-    # The phases other than flight that particles have been in.
+    # The phases other than flight in which particles have been.
     _kinds: Set[int] = frozenset()
     # The times at which frames are cut into pieces [s]; None for whole frames.
     _instants: Sequence[float] | None = None

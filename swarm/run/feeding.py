@@ -22,7 +22,7 @@ _APART = 1.0 + 1e-12
 
 
 class There(NamedTuple):
-    """The balls that are in the vessel at an instant: their centres and velocities (3, n), and their radii (n,)."""
+    """The balls in the vessel at an instant: their centres and velocities (3, n), and their radii (n,)."""
 
     position: Floats
     velocity: Floats
@@ -73,13 +73,13 @@ class Feed:
         self._changing = [i for i, one in enumerate(scene.surfaces) if changes(one) and not one.reacts()]
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The arrays of a checkpoint, for `BaseRun.arrays`."""
+        """Return the arrays of a checkpoint, for `BaseRun.arrays`."""
         own = {"over": self._over, "tried": self._tried, "blocked": self._blocked, "earliest": self._earliest}
         own |= {"counted": self._counted, "energy": self._energy, "born_time": self.born_time}
         return {f"feed.{name}": array for name, array in own.items()}
 
     def observed(self) -> dict[str, Any]:
-        """The observables of sources."""
+        """Return the observables of sources."""
         source, sources = self._births.source, self._births.sources
         here = source[~np.isnan(self.born_time) & (source >= 0)]
         return {
@@ -88,7 +88,7 @@ class Feed:
         }  # fmt: skip
 
     def seen(self, state: State) -> State:
-        """The state of the balls that were born, in the order of their numbers."""
+        """Return the state of the balls that have been born, in the order of their numbers."""
         there = ~np.isnan(self.born_time)
         return state if there.all() else state.of(there)
 

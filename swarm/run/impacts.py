@@ -142,7 +142,7 @@ class Impacts:
                 self._spare.put(log)
 
     def close(self) -> None:
-        """Let no thread wait for an empty log from now on."""
+        """Close the log: no thread waits for an empty log from now on."""
         self._over = True
 
 

@@ -71,7 +71,7 @@ def _target(name: str, value: Any) -> Path | None:
     return None if value is None else paths.target_of_run(name, value)
 
 
-Target = Annotated[Any, _target]  # then a Path or None
+Target = Annotated[Any, _target]  # a Path or None after the check
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ class Task:
 
     @property
     def scene(self) -> Scene:
-        """The scene as described."""
+        """The scene as users describe it."""
         return self.compiled.scene
 
     @property

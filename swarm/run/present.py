@@ -12,7 +12,7 @@ from ..state import Floats, State
 
 
 class Presence:
-    """The particles of the start, and those born by the end of a frame: only these are drawn and summed.
+    """The particles of the start, and the particles born by the end of a frame: only these are drawn and summed.
 
     Args:
         births: the births, or None if all particles are in the scene from the start.

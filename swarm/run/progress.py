@@ -122,7 +122,7 @@ def _of_run(one: ProgressListener, every: float) -> Display:
 
 
 class _Recent:
-    """The last seconds of a run."""
+    """The values of a run in the last seconds."""
 
     def __init__(self) -> None:
         self._moments, self._impacts = Pace(_WINDOW), Pace(_WINDOW)

@@ -156,7 +156,7 @@ class Session:
             there = dataclasses.replace(self._job, **before.identity)
             there.require_same(dataclasses.replace(self._job, particles=task.count), path)
             if self.first == 0:
-                return  # a kill came before the first frame of the trajectory
+                return  # the run was killed before the first frame of the trajectory
             before.require_holds(self._job.frame + 1, self._job.rows, self._job.sums, self._path)
             before.require_intact()
 

@@ -86,7 +86,7 @@ class Tally:
         return found
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
-        """Go on from the arrays of a checkpoint."""
+        """Set the counts to the arrays of a checkpoint."""
         self._units = Units(**{name: float(arrays[f"member_{name}_unit"][0]) for name in self._summed()})
         self._counts = {}
         mine = self.counts()

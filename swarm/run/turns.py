@@ -13,7 +13,7 @@ from .watch import Watch
 # The most turns of a particle from kernel to kernel in which no time passes. A wedge, a cusp and a chatter stay in the
 # kernel of flights; ordinary contacts take two or three such turns.
 MOST = 1000
-# The turn of the first look at particles for which no time passes: few frames have so many turns.
+# The turn of the first look at particles for which no time passes: few frames have this number of turns.
 _FIRST = 10
 # (status, particle, the particles that a halt left in the lanes)
 End = tuple[int, int, Halted | None]

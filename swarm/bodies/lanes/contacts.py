@@ -157,7 +157,7 @@ class BodyContacts(Constrained):
         return over.carry(float(wall), y0) - y0, h * over.mean_velocity(float(wall), y0, y1, h)
 
     def slip(self, walls, wall, c, u):
-        """The velocity of a contact at a place relative to its wall."""
+        """The velocity of a contact at a place, relative to its wall."""
         return u - walls.velocity(float(wall), c) if self.walls_move() else u
 
     def fastest(self, u, slip):

@@ -60,7 +60,7 @@ def restore(bodies, state, i):
 
 
 def _stretched(ties, r, i):
-    """The energy of springs."""
+    """The energy of springs of a lane."""
     total = 0.0
     for a in range(ties.links, ties.ends.shape[0]):
         y = column(r, 3 * ties.ends[a, 0], i) - column(r, 3 * ties.ends[a, 1], i)

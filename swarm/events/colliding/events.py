@@ -96,7 +96,7 @@ def _book(flock, books, clock, pair, blow, now):
 
 
 def _at_wall(box, flock, books, clock, i, now):
-    """Carry out what is due for a ball at a wall: an impact, a release, or a new search; return FLIES, or a failure."""
+    """Carry out the event of a ball at a wall: an impact, a release, or a new search; return FLIES, or a failure."""
     if box.heavy is not None:
         if flock.wall(i) >= first_number(box):
             return strike_heavy(box, flock, books, clock, i, now)

@@ -27,7 +27,7 @@ class BallSpins(Record):
     """The spins of balls, and the friction of their collisions."""
 
     spin: Array  # (3, N) [rad/s]
-    friction: Any  # of two balls; None: their collisions are smooth
+    friction: Any  # the coefficient of friction of two balls; None for smooth collisions
 
     def at(self, i):
         """The spin of a ball."""

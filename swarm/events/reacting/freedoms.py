@@ -274,7 +274,7 @@ class Shifted(Freedom):
         walls.time[k] = t
 
     def hardest(self, walls):
-        """A bound of the wall's acceleration between impacts [m/s^2]."""
+        """A bound of the acceleration of the wall between impacts [m/s^2]."""
         if self.rate is None:
             return norm(self.pull)
         k = index(self.row)

@@ -77,7 +77,7 @@ class Reacting(Record):
     restitution: float
     laws: Any = None  # None, or the `Laws` of the surface, if they are more than a restitution
     number: float = 0.0  # its number among the walls of the surface
-    absorbs: Any = None  # 1 where a law may absorb particles
+    absorbs: Any = None  # 1 if a law may absorb particles, or None
     openings: Any = None  # None, or each `Opened`, which move with the wall
 
     def count(self):

@@ -52,7 +52,7 @@ def give(task: Task) -> None:
     _warn_of_light(task)
     softness.warn_of_depths(task)
     if task.bodies is None and task.particles.radius is None and len(task.particles):
-        # The speed of the fastest in a sample.
+        # The speed of the fastest particle in a sample.
         some = task.particles.velocity[:, _some(len(task.particles))]
         fastest = float(np.sqrt((some**2).sum(axis=0).max()))
         # The speed after a fall through the scene.
@@ -160,7 +160,7 @@ def _warn_of_times(task: Task, crossing: float) -> None:
         return
     between = workload.time_between(task.compiled, task.particles)
     if kept > _ROUND_OFF * between:
-        # Within a frame times are counted from its end.
+        # Times within a frame are counted from its end.
         inside = float(np.spacing(every)) > _ROUND_OFF * between
         flights = "flights too, in frames this long" if inside else "flights are not: each frame counts from its end"
         _LOG.warning(

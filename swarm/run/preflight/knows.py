@@ -1,4 +1,4 @@
-"""What each engine supports, and the sentences of the errors for what it does not support.
+"""The capabilities of each engine, and the sentences of the errors for capabilities that it does not support.
 
 The particles of a run, its method, and whether impacts move a wall determine its engine. A capability is a property
 that a run may have: a law of a wall, a source, a period. `CAPABILITIES` has a `Refusal` for each pair of an engine

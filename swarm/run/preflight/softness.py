@@ -126,7 +126,7 @@ def _warn_of_walls(scene: Scene, particles: Particles, radius: Floats, method: M
 
 
 def _warn_of_pairs(scene: Scene, particles: Particles, radius: Floats, method: Method) -> None:
-    """Warn of the ball that sinks deepest into the fastest one, as a part of the smaller radius."""
+    """Warn of the ball that sinks deepest into the fastest ball, as a part of the smaller radius."""
     fastest = int(np.nanargmax((particles.velocity**2).sum(axis=0)))
     speeds = np.sqrt(((particles.velocity - particles.velocity[:, [fastest]]) ** 2).sum(axis=0))
     mass = particles.mass * particles.mass[fastest] / (particles.mass + particles.mass[fastest])

@@ -96,7 +96,7 @@ def _distance(scene: Scene, wall: int, place: Places) -> float:
         for _way in range(_WAYS):
             gap, slope = float(gaps_of(images, r, 0.0)[0, 0]), gradient_of(images, r)
             steep = float((slope**2).sum())
-            # The middle of a surface has no way out.
+            # The middle of a surface has no gradient, and so no way out.
             move = -gap / steep * slope if steep > 0.0 else np.array([[0.48], [0.6], [0.64]]) * step
             r = r + move
             gone = float(np.sqrt(((r - place) ** 2).sum()))
