@@ -13,9 +13,9 @@ import numpy as np
 import swarm
 from swarm import observables
 from swarm.bodies import body_run
+from swarm.common.catalog import Observables
 from swarm.events import walls_run
 from swarm.fleet import jobs, joined, sharded_run, shards
-from swarm.run.machine import RunEnd
 from swarm.run.measures import Measures
 from swarm.run.options import Task
 
@@ -27,7 +27,7 @@ _ARRAYS = ("impacts_per_particle", "escape_time", "absorbed_time", "birth_time",
 _OF_PARTICLES = ("position", "velocity", "mass", "radius", "spin", "image")
 
 
-def carry_out(task: Task, session: sharded_run.Sharded) -> RunEnd:
+def carry_out(task: Task, session: sharded_run.Sharded) -> swarm.Result:
     """Carry out a run that is checked, as `sharded_run.carry_out`.
 
     Raises:
@@ -46,7 +46,7 @@ def carry_out(task: Task, session: sharded_run.Sharded) -> RunEnd:
         seen = joined.join(folder, task, bounds, session.identity, measures)
         end = shards.joined_end(folder, task, bounds)
         session.finish()
-    return end._replace(observables=seen, wall_time=session.wall_time())
+    return dataclasses.replace(end, observables=Observables(seen), wall_time=session.wall_time())
 
 
 @contextlib.contextmanager

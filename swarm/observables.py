@@ -16,8 +16,8 @@ from .kernel.jit import kernel, select
 from .kernel.vector import Vec, column, cross, dot, square, vec
 from .scene import Scene
 from .state import CROSSED, Floats, State, is_gone
-from .surfaces.depth import penetration
 from .surfaces.time_of_impact import flights
+from .surfaces.walls import penetration
 
 # The number of particles in a partial sum. Unlike the block size it affects the last bits of results.
 CHUNK = 256

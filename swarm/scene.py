@@ -1,7 +1,7 @@
 """The scene as users describe it: checked surfaces and gravity, and the enclosed volume."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -469,6 +469,10 @@ class Scene:
     @cached_property
     def _of_points(self) -> CompiledScene:
         return CompiledScene(self)
+
+    def at_frame(self, seen: Mapping[str, Any], k: int) -> "Scene":
+        """Return the scene with its reacting walls held at their poses in frame k of the observables of a run."""
+        return self.placed(seen["wall_position"][k], seen["wall_orientation"][k]) if self.reacts() else self
 
     def placed(self, positions: ArrayLike, orientations: ArrayLike) -> "Scene":
         """Return the scene with its reacting walls held at the `wall_position` and `wall_orientation` of a frame."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .common.checks import count, known_keys, particles_fit
+from .common.checks import known_keys, particles_fit
 from .common.columns import read_columns, row_of
 from .common.validated import Count, Flag, Magnitude, NotNegativeCount, Part, Positive, Validated
 from .errors import SceneError
@@ -310,12 +310,8 @@ def _named_files(document: dict[str, Any], path: Path) -> Iterator[Path]:
     """Yield the existing files that texts of the document name, except outputs, and the shards of trajectories."""
     run = document.get("run")
     read = {key: value for key, value in run.items() if key not in OUTPUTS} if isinstance(run, dict) else {}
-    places: list[Any] = [{**document, "run": read}]
-    while places:
-        place = places.pop()
-        if isinstance(place, (dict, list)):
-            places += place.values() if isinstance(place, dict) else place
-        elif isinstance(place, str) and paths.is_file(file := path.parent / place):
+    for _key, text in tables.texts_in({**document, "run": read}):
+        if paths.is_file(file := path.parent / text):
             yield file
             yield from paths.shards_of(file).glob("*.h5")
 
@@ -354,22 +350,15 @@ def _particles(given: Any) -> ParticlesTable:
     if isinstance(given, Mapping) and "within" in given:
         given = {**given, "within": tables.surface_of(given["within"], "particles.within")}
     table = tables.convert(given, ParticlesTable, "particles")
+    suffix = "" if table.source is None else Path(table.source).suffix.lower()
     filled = ("count", "speed", "temperature", "mass", "seed", "exact", "radius", "fraction", "within")
-    if table.source is None:
-        if table.frame is not None:
-            raise SceneError('particles.frame: needs from = "FILE.h5"')
-        if table.count is None and table.fraction is not None:
-            return table
-        if table.count is None:
-            raise SceneError("particles.count: expected a whole number, got nothing; add count = ... or from = ...")
-        count("particles.count", table.count)
-        return table
     both = [name for name in filled if getattr(table, name) is not None]
-    if both:
+    if table.source is not None and both:
         raise SceneError(f"particles.{both[0]}: cannot be combined with from = {table.source!r}; remove one of them")
-    suffix = Path(table.source).suffix.lower()
-    if suffix not in (".csv", ".h5"):
+    if table.source is not None and suffix not in (".csv", ".h5"):
         raise SceneError(f"particles.from: expected a .csv or .h5 file, got {table.source!r}")
     if table.frame is not None and suffix != ".h5":
         raise SceneError('particles.frame: needs from = "FILE.h5"')
+    if table.source is None and table.count is None and table.fraction is None:
+        raise SceneError("particles.count: expected a whole number, got nothing; add count = ... or from = ...")
     return table

@@ -49,17 +49,16 @@ def test_an_impact_on_a_wall_that_moves(loses):
 @pytest.mark.parametrize("loses", [True, False])
 def test_a_short_step_whose_work_is_booked(loses):
     walls, state = opened(ALONE)
-    accounts.book_step(walls, state, ONE, 0.0, (BEFORE, AFTER), GIVEN, loses)
+    accounts.book(walls, state, ONE, 0.0, (BEFORE, AFTER), GIVEN, loses, GIVEN)
     work = 0.5 * MASS * GIVEN + state.impulse[1, ONE]
     assert work - state.dissipated[ONE] == CHANGE
     assert (state.dissipated[ONE] > 0.0) == loses
     assert state.energy[ONE] == 0.5 * AFTER
 
 
-@pytest.mark.parametrize("book", [accounts.book, accounts.book_step])
-def test_a_wall_at_rest_gives_nothing(book):
+def test_a_wall_at_rest_gives_nothing():
     walls, state = opened([swarm.Sphere(2.0)])
-    book(walls, state, ONE, 0.0, (BEFORE, AFTER), 0.0, True)
+    accounts.book(walls, state, ONE, 0.0, (BEFORE, AFTER), 0.0, True)
     assert -state.dissipated[ONE] == CHANGE
     assert not state.impulse.any()
 

@@ -19,7 +19,7 @@ from swarm.files import checkpoint, paths, writer
 from swarm.lanes import block as blocks
 from swarm.run import progress
 from swarm.run.engine import Run
-from swarm.run.progress import lines
+from swarm.run.progress import display_by, in_lines
 from swarm.surfaces.fields import grouped
 
 DOWN = (0.0, 0.0, -1.0)
@@ -476,7 +476,7 @@ def test_plain_lines_tell_how_it_goes(capsys, monkeypatch):
     monkeypatch.setattr(time, "monotonic", lambda: clock[0])
     from swarm.run.simulation import Frame
 
-    show = lines(60.0)
+    show = display_by(in_lines(60.0), 60.0)
     for number in range(8):
         # The first frame compiles for a minute and a half, which the estimate must not include; then 20 s each.
         clock[0] += 90.0 if number == 1 else 20.0

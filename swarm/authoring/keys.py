@@ -148,6 +148,9 @@ _OF_CLASS: dict[tuple[str, str], Form] = {
     ("ParticlesTable", "radius"): NUMBERS,
     ("ParticlesTable", "within"): named("place"),
     ("Path", "times"): listed(NUMBER, 2),
+    ("Opening", "times"): SPANS,
+    ("Counter", "surface"): named("place"),
+    ("Counter", "inside"): named("place"),
     ("Absorb", "probability"): PART,
     ("Absorb", "loss"): PART,
     ("CercignaniLampis", "normal"): PART,
@@ -267,11 +270,11 @@ def tables() -> tuple[Table, ...]:
         *(_surface(kind, cls, common) for kind, cls in ALL_SURFACES.items()),
         *_kinds("surface.motion", ALL_MOTIONS),
         *(_law(kind, cls) for kind, cls in ALL_LAWS.items()),
-        Table("surface.openings", "", "keys of an opening besides those of its surface.", _opening()),
+        Table("surface.openings", "", "keys of an opening besides those of its surface.", keys_of(Opening)[1:]),
         Table("pairs", "", first_line(Pairs), keys_of(Pairs)),
         *_kinds("method", ALL_METHODS),
         Table("source", "", first_line(Source), keys_of(Source)),
-        Table("counter", "", first_line(Counter), _counter()),
+        Table("counter", "", first_line(Counter), keys_of(Counter)),
         Table("run", "", "the length of the run, its files, and how it is carried out.", _run(runs)),
     )
 
@@ -341,19 +344,3 @@ def _law(kind: str, cls: Any) -> Table:
         for name in cls._fields
     )
     return Table("surface.laws", kind, first_line(cls), keys)
-
-
-def _opening() -> tuple[TableKey, ...]:
-    known = meanings_of(Opening)
-    return (
-        TableKey("times", SPANS, meaning=known["times"]),
-        TableKey("between", {"type": "boolean"}, False, False, known["between"]),
-    )
-
-
-def _counter() -> tuple[TableKey, ...]:
-    known = meanings_of(Counter)
-    return (
-        TableKey("surface", named("place"), True, meaning=known.get("surface", "")),
-        TableKey("inside", named("place"), meaning=known.get("inside", "")),
-    )

@@ -21,6 +21,7 @@ from ..fleet.plan import Plan, in_one_line
 from ..fleet.plan import read as plan_of
 from ..kernel import cache
 from ..run.engines import run_of
+from ..run.impacts import chosen
 from ..run.machine import warn_open
 from ..run.options import Task
 from ..run.preflight import hints, knows, workload
@@ -178,7 +179,8 @@ def _sizes(task: Task, target: Path, there: str) -> dict[str, str]:
     most = "at most " * (storage.compression != "none")
     files = [(f"trajectory {target}", f"{most}{in_bytes(size)}", there)]
     if options.impacts is not None:
-        rows = _impacts(task) * _logged(options.impact_particles, n)
+        logged = chosen(options.impact_particles, n)
+        rows = _impacts(task) * (1.0 if logged is None else float(logged.mean()))
         there = _there(options.impacts, "impacts")
         files.append((f"log of impacts {options.impacts}", f"about {in_bytes(_ROW * rows)}", there))
     if options.recording is not None:
@@ -197,13 +199,6 @@ def _on_disk(task: Task) -> float:
     """The bytes of the trajectory, before compression."""
     times, storage = task.options.times, task.options.storage
     return times.on_disk(len(task.scene.surfaces)) + size_of(task.scene, task.particles, storage, times.count)
-
-
-def _logged(particles: Any, n: int) -> float:
-    """The part of the particles that is logged."""
-    if isinstance(particles, str):
-        return 1.0
-    return len(particles) / n if isinstance(particles, tuple) else 1.0 / particles
 
 
 def _there(path: Path, what: str) -> str:
@@ -313,15 +308,12 @@ def _impacts(task: Task) -> float:
     """The impacts on walls, if particles go on as they fly at the start; 0 if no particle flies."""
     if not task.scene.surfaces or not len(task.particles):
         return 0.0
-    moves = task.scene.moves()
-    between = _crossing(task) if moves else workload.time_between(task.compiled, task.particles)
+    if not task.scene.moves():
+        between = workload.time_between(task.compiled, task.particles)
+    else:
+        # A crossing of the scene at the mean speed, after a fall where there is gravity.
+        between = task.scene.finite_size() / speed if (speed := _speed(task)) > 0.0 else math.inf
     return len(task.particles) * task.options.until / between if 0.0 < between < math.inf else 0.0
-
-
-def _crossing(task: Task) -> float:
-    """The time of a crossing of the scene at the mean speed, after a fall where there is gravity [s]."""
-    speed = _speed(task)
-    return task.scene.finite_size() / speed if speed > 0.0 else math.inf
 
 
 def _speed(task: Task) -> float:

@@ -6,10 +6,11 @@ The pages are plain HTML with one script, which searches in `search.js`: they wo
 
 import html
 import inspect
+import itertools
 import json
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -17,34 +18,18 @@ from typing import Any, NamedTuple
 from ..common.catalog import OBSERVABLES
 from ..common.signature import show_in_lines
 from ..errors import FileError, SceneError
+from ..files import marks
 from ..files.paths import target_of
 from ..version import VERSION
 from . import file_run
 from .docstrings import entries_of, first_line, meanings_of, sections_of
 from .keys import Form, Table, tables
-from .texts import write_text
 
 _HERE, _PACKAGE = Path(__file__).parent, sys.modules[__package__.partition(".")[0]]
 # A topic and names of it, and names on the next lines, in the docstring of the package.
 _TOPIC = re.compile(r"(?m)^ {4}(\S[\w ]*?) {2,}(.*(?:\n {10,}.*)*)")
 _SECTIONS = ("Returns", "Raises", "Conserves", "Order", "Cost", "Source", "Reference")
 _WITH_ENTRIES = ("Args", "Attributes", "Raises")
-
-
-class Command(NamedTuple):
-    """A command of the command line.
-
-    Attributes:
-        name: as it is typed, behind swarm.
-        about: what it does.
-        options: for each argument or option its names, its default, and what it is.
-        example: or "".
-    """
-
-    name: str
-    about: str
-    options: tuple[tuple[str, str, str], ...]
-    example: str
 
 
 class Entry(NamedTuple):
@@ -81,8 +66,8 @@ def topics() -> dict[str, list[str]]:
     return {title: re.findall(r"\w+", names) for title, names in _TOPIC.findall(text)}
 
 
-def write(folder: Path, commands: tuple[Command, ...], overwrite: bool = False) -> Path:
-    """Write the pages into a folder, which is made, and return the first page.
+def write(folder: Path, commands: Mapping[str, Any], overwrite: bool = False) -> Path:
+    """Write the pages into a folder, which is made, and return the first page; `commands` are those of click.
 
     Raises:
         SceneError: the folder is a file, or holds a page that may not be replaced.
@@ -100,11 +85,11 @@ def write(folder: Path, commands: tuple[Command, ...], overwrite: bool = False) 
     except OSError as error:
         raise FileError(f"cannot make the folder {target}: {error.strerror}") from error
     for name, text in {**pages, "search.js": search, "reference.js": script}.items():
-        write_text("page of the reference", target / name, text, overwrite)
+        marks.write(target / name, text.encode(), "page of the reference", overwrite)
     return target / "index.html"
 
 
-def sections(commands: tuple[Command, ...]) -> tuple[Section, ...]:
+def sections(commands: Mapping[str, Any]) -> tuple[Section, ...]:
     """All pages: the topics of public names, the observables, the keys of scene files, the commands."""
     named = tuple(
         Section(_file(title), title, tuple(_of_name(name) for name in names)) for title, names in topics().items()
@@ -113,7 +98,7 @@ def sections(commands: tuple[Command, ...]) -> tuple[Section, ...]:
         *named,
         Section("observables", "Observables", (_of_observables(), *map(_of_observable, OBSERVABLES))),
         Section("scene-files", "Keys of scene files", tuple(map(_of_table, tables()))),
-        Section("commands", "Commands", tuple(map(_of_command, commands))),
+        Section("commands", "Commands", tuple(itertools.starmap(_of_command, commands.items()))),
     )
 
 
@@ -251,16 +236,12 @@ def _of_table(table: Table) -> Entry:
     place_name = ".".join(filter(None, ("key", table.place, table.kind)))
     rows = ""
     for key in table.keys:
-        default = "needed" if key.needed else "" if key.default is None or key.default == () else _value(key.default)
+        default = "needed" if key.needed else "" if key.default in (None, ()) else json.dumps(key.default, default=str)
         cells = f"<code>{_text(key.name)}</code>", _text(form_in_words(key.form)), _text(default), _line(key.meaning)
         rows += f"<tr id='{place_name}.{key.name}'>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
     head = "<tr><th>key</th><th>value</th><th>default</th><th>meaning</th></tr>"
     anchor = place_name.replace("key", "table", 1)
     return Entry(anchor, title, table.meaning, f"<p>{_line(table.meaning)}</p><table>{head}{rows}</table>")
-
-
-def _value(value: Any) -> str:
-    return json.dumps(value) if isinstance(value, (bool, int, float, str, tuple, list)) else str(value)
 
 
 def form_in_words(form: Form) -> str:
@@ -316,21 +297,23 @@ _NAMED = {
 _FEW = {2: "two", 3: "three", 4: "four"}
 
 
-def _of_command(command: Command) -> Entry:
-    rows = "".join(
-        f"<tr id='option.{command.name}.{_text(_long(names))}'><td><code>{_text(names)}</code></td>"
-        f"<td>{_text(default)}</td><td>{_line(about)}</td></tr>"
-        for names, default, about in command.options
-    )
+def _of_command(name: str, command: Any) -> Entry:
+    rows = "".join(_of_option(name, one) for one in command.params if one.name != "help")
     head = "<tr><th>argument or option</th><th>default</th><th>meaning</th></tr>"
-    body = f"<p>{_line(command.about)}</p><table>{head}{rows}</table>"
-    body += f"<pre>{_text(command.example)}</pre>" if command.example else ""
-    return Entry(f"command.{command.name}", f"swarm {command.name}", command.about, body)
+    about, (example, *_codes) = " ".join(command.help.split()), command.epilog.split("\n")
+    body = f"<p>{_line(about)}</p><table>{head}{rows}</table><pre>{_text(example)}</pre>"
+    return Entry(f"command.{name}", f"swarm {name}", about, body)
 
 
-def _long(names: str) -> str:
-    """The long name of an option, of one with several the first; an argument has one."""
-    return next((name for name in names.split(", ") if name.startswith("--")), names)
+def _of_option(command: str, one: Any) -> str:
+    """The row of an argument or option of click: its names, its default, and what it is."""
+    if one.param_type_name == "argument":
+        names, default = [one.metavar], "needed"
+    else:
+        names, default = [*one.opts, *one.secondary_opts], "" if one.default in (None, False) else str(one.default)
+    long = next((name for name in names if name.startswith("--")), names[0])
+    cells = f"<code>{_text(', '.join(names))}</code>", _text(default), _line(one.help)
+    return f"<tr id='option.{command}.{_text(long)}'>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
 
 # --- Pages -----------------------------------------------------------------------------------------------

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ..common.checks import one_of
-from .texts import write_text
+from ..files import marks
 
 _FOLDER = Path(__file__).parent / "scenes"
 KINDS = tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
@@ -24,4 +24,4 @@ def text_of(kind: str) -> str:
 def begin(kind: str, path: Path | None = None) -> Path:
     """Write a scene file to begin with, KIND.toml in the current folder or another new file; its path."""
     text = text_of(kind)
-    return write_text("scene file", Path(f"{kind}.toml") if path is None else path, text)
+    return marks.write(Path(f"{kind}.toml") if path is None else path, text.encode(), "scene file")

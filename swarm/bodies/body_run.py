@@ -4,13 +4,13 @@ import math
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
-from ..contact.laws import NONE
+from ..contact.laws import NONE, Laws
 from ..errors import RunError
 from ..kernel.limits import SOLVED_PLACE
 from ..methods.base import Method
@@ -26,7 +26,7 @@ from ..run.starting_state import UNSEEDED, Seeding
 from ..run.tally import UNWATCHED, Watched
 from ..run.tiers import Tier
 from ..scene import Scene
-from ..state import Floats, State, none_left
+from ..state import Crossed, Floats, State, none_left
 from .births import BodyFeed
 from .body import squares_between
 from .copies import Bodies
@@ -70,16 +70,16 @@ class BodyRun(BaseRun):
             len(compiled.numbering.surfaces_of_rows) + len(own),
         )
         laws = self._touching.laws or NONE
-        books = _Books(self._walls[2] is not None, scene.moves(), laws.give_heat, laws.may_end)
-        self._bodies = _state_of(bodies, particles, rows, walls, books)
         self._counted_by, self._counters = watched.counters, counters_of(scene, watched.counters, logs=True)
-        self._bodies = self._with_counters(self._bodies, scene, bodies)
+        counters, opens = self._counters, self._walls[2] is not None
+        crossed = None if counters is None else crossed_of(counters, self._counted_by, scene, bodies.centers())
+        self._bodies = _state_of(bodies, particles, (rows, walls), opens, scene.moves(), laws, crossed)
         none = np.zeros(0)
         # The part of the state that files take.
         self.state = State(
             particles.position, particles.velocity, particles.mass, none, none, np.zeros(points * n, np.int64),
             np.zeros((walls, 0)), none, None,
-            image=particles.image, **none_left(points * n, books.open, books.absorb),
+            image=particles.image, **none_left(points * n, opens, laws.may_end),
         )  # fmt: skip
         contacts = most_contacts_of(self._touching, soft)
         per_lane = 8 * (24 * points + 10 * rows + rows * rows + 20 * contacts)
@@ -148,12 +148,6 @@ class BodyRun(BaseRun):
                     self._bodies.remaining[~np.isnan(time)] = 0.0
             self._feed_in(moment)
         self._rule = self._rule._replace(end=moment)
-
-    def _with_counters(self, state: BodyState, scene: Scene, bodies: Bodies) -> BodyState:
-        """Return the state, with the array of crossings if there are counters."""
-        if self._counters is None:
-            return state
-        return state._replace(crossed=crossed_of(self._counters, self._counted_by, scene, bodies.centers()))
 
     def _energy_of(self, r: Floats, v: Floats) -> Floats:
         """The energy of copies (n,) [J]."""
@@ -288,9 +282,10 @@ class BodyRun(BaseRun):
         sums, errors, depths = zip(*(self._sums_of(*block, moment) for block in self._blocks()), strict=True)
         self._sums = np.ascontiguousarray(np.array(sums).T)
         own, cavities = len(self._own), len(self._body.cavities)
+        counters = 0 if self._counters is None else len(self._counters.each)
         self._seen = {
             **gone_of(self.state._replace(escape_time=None), 0, self._surfaces_of_walls, surfaces),
-            **summed(self._sums, self._owners, surfaces, (own, cavities, bodies.heat is not None), self._counted()),
+            **summed(self._sums, self._owners, surfaces, (own, cavities, bodies.heat is not None), counters),
             "energy_error": max(errors),
             "max_penetration": float(max([*depths, *(out.max() for out in self._out_of_own())])),
             "impacts": int(bodies.impacts.sum()),
@@ -304,10 +299,6 @@ class BodyRun(BaseRun):
             self.state.born_time[:] = np.tile(self._feed.born_time, len(self._body))  # type: ignore[index]
         if self._rule.loop:
             self._seen["sweeps"] = int(bodies.sweeps.sum())
-
-    def _counted(self) -> int:
-        """Return the number of counters."""
-        return 0 if self._counters is None else len(self._counters.each)
 
     def _sums_of(self, some: Any, r: Floats, v: Floats, moment: float) -> tuple[list[float], float, float]:
         """Return the sums of a chunk, as `summed` takes them, its largest error of the energy, and largest depth."""
@@ -383,18 +374,12 @@ def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:
     return pool
 
 
-class _Books(NamedTuple):
-    """The properties of walls that determine their books."""
-
-    open: bool
-    move: bool
-    heat: bool
-    absorb: bool
-
-
-def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int, books: _Books) -> BodyState:
-    """Return the state of all copies at the start, with `rows` multipliers and `walls` rows of impulse."""
-    n, body = len(bodies), bodies.body
+def _state_of(
+    bodies: Bodies, particles: Particles, size: tuple[int, int], opens: bool, moves: bool, laws: Laws,
+    crossed: Crossed | None,
+) -> BodyState:  # fmt: skip
+    """Return the state of all copies at the start; `size` has the rows of multipliers and of walls."""
+    (rows, walls), n, body = size, len(bodies), bodies.body
     anchors = [(q, body.anchors[q]) for q in led_points(body)]
     paths = [[motion.harmonic(start) for start in bodies.position[:, q].T] for q, motion in anchors]  # type: ignore[union-attr]
     # (A, 13, n): the start, velocity, cosine, sine and rate of each led point of each copy.
@@ -419,10 +404,11 @@ def _state_of(bodies: Bodies, particles: Particles, rows: int, walls: int, books
         sweeps=whole[3],
         unconverged=whole[4],
         energy=np.zeros(n),
-        free=np.zeros((len(body.contacts), n), np.int8) if books.open else None,
-        wall_work=np.zeros((walls, n)) if books.move else None,
-        heat=np.zeros((walls, n)) if books.heat else None,
-        **none_left(n, books.open, books.absorb),
+        free=np.zeros((len(body.contacts), n), np.int8) if opens else None,
+        wall_work=np.zeros((walls, n)) if moves else None,
+        heat=np.zeros((walls, n)) if laws.give_heat else None,
+        **none_left(n, opens, laws.may_end),
         mass=np.full(n, body.mass_matrix.sum()),
         image=bodies.image,
+        crossed=crossed,
     )

@@ -7,11 +7,10 @@ import click
 from ..common import interrupt
 from ..errors import SceneError, SwarmError
 from ..version import VERSION
-from .docs import docs
 from .options import Group
 from .pictures import animate, plot, record, report, view
 from .run import run
-from .scenes import check, new, schema
+from .scenes import check, docs, new, schema
 from .sweep import sweep
 from .trajectories import export, info
 

@@ -83,10 +83,11 @@ def report(
     overwrite: Annotated[bool, Option("--overwrite", help="Replace an existing page.")] = False,
 ) -> None:
     """Make a page of a run or a sweep, one file for any browser: verdicts, pictures, numbers, how to reproduce it."""
-    from ..fleet.report import checked, page_of
+    from ..fleet import report as reports
 
-    target = checked(source, output, overwrite)
-    written(page_of(source, target).save(target, overwrite=overwrite))
+    target = output or reports.page_file(source)
+    reports.report(source, target, overwrite=overwrite)
+    written(target)
 
 
 def animate(

@@ -1,8 +1,10 @@
-"""`swarm new`, `swarm check` and `swarm schema`: scene files before a run."""
+"""`swarm new`, `check`, `schema` and `docs`: scene files before a run, and the reference."""
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
+
+import click
 
 from .options import Option, Positional
 from .shown import Plugins, table, written
@@ -44,10 +46,23 @@ def schema(
 ) -> None:
     """Write the JSON Schema of scene files, by which editors complete and check them."""
     from ..authoring.schema import schema_of
-    from ..authoring.texts import write_text
+    from ..files import marks
 
     text = json.dumps(schema_of(sweep), indent=1, ensure_ascii=False) + "\n"
     if output is None:
         print(text, end="")
         return
-    written(write_text("schema", output, text, overwrite))
+    written(marks.write(output, text.encode(), "schema", overwrite))
+
+
+def docs(
+    folder: Annotated[
+        Path, Option("-o", "--output", metavar="FOLDER", help="Of the pages; index.html is the first.")
+    ] = Path("swarm-docs"),
+    overwrite: Annotated[bool, Option("--overwrite", help="Replace the pages that the folder holds.")] = False,
+) -> None:
+    """Write the reference: pages of all public names, observables, keys of scene files and commands."""
+    from ..authoring.reference import write
+
+    app: Any = click.get_current_context().find_root().command
+    print(f"written to {write(folder, app.commands, overwrite)}")

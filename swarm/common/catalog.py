@@ -39,7 +39,11 @@ class Observable(NamedTuple):
     instead: str = ""
 
     def components(self) -> tuple[str, ...] | None:
-        """The names of the entries of its last axis; None if they have numbers."""
+        """The names of the entries of its last axis; None if they have numbers.
+
+        >>> OBSERVABLES["momentum"].components(), OBSERVABLES["impulse"].components()
+        (('x', 'y', 'z'), None)
+        """
         return _COMPONENTS.get(self.axes[-1]) if self.axes else None
 
     def shape(self, lengths: dict[str, int]) -> tuple[int | None, ...]:
@@ -129,15 +133,6 @@ ERRORS = tuple(name for name, one in OBSERVABLES.items() if one.every and one.jo
 def may_be_nan(name: str) -> bool:
     """Whether NaN is one of the values of an observable."""
     return name in OBSERVABLES and OBSERVABLES[name].may_be_nan
-
-
-def components_of(name: str) -> tuple[str, ...] | None:
-    """The names of the entries of the last axis of an observable; None if they have numbers.
-
-    >>> components_of("momentum"), components_of("impulse")
-    (('x', 'y', 'z'), None)
-    """
-    return OBSERVABLES[name].components() if name in OBSERVABLES else None
 
 
 class Observables(dict[str, Any]):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from .catalog import components_of
+from .catalog import OBSERVABLES
 from .checks import path_of
 from .extras import needed_by
 
@@ -37,9 +37,10 @@ def flattened(observables: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     written = [name for name in observables if not name.startswith("member_")]
     for name in sorted(written, key=lambda name: name != "time"):
         values = np.asarray(observables[name])
+        components = OBSERVABLES[name].components() if name in OBSERVABLES else _OF_LOGS.get(name)
         for place in np.ndindex(values.shape[1:]):
             parts = [str(i) for i in place]
-            if (components := components_of(name) or _OF_LOGS.get(name)) is not None:
+            if components is not None:
                 parts[-1] = components[place[-1]]
             columns["_".join([name, *parts])] = values[:, *place]
     return columns

@@ -34,9 +34,9 @@ ROWS = 1024
 class Frame:
     """A finished frame: what `progress` and the functions of `observables` are called with, and `Result.frames` gives.
 
-    The arrays of particles cannot be written. In a function of `observables` they are the run's own, which the next
-    frame changes: what it returns is copied. Anywhere else they are copies, made when they are first read; `progress`
-    reads them during its call. Of bodies the particles are all points, of a trajectory those that it keeps.
+    The arrays of particles are copies, made when they are first read, and cannot be written. `progress` and functions
+    of `observables` read them during their call. Of bodies the particles are all points, of a trajectory those that it
+    keeps.
 
     Attributes:
         number: the number of the frame, from 0 on.
@@ -168,14 +168,14 @@ class FrameTimes(Validated):
             before = number * self.every
         yield self.count - 1, before, self.until
 
-    def on_disk(self, surfaces: int, more: int = 0) -> int:
-        """Bytes of a file without its particles: groups and the observables of all frames, with `more` in each."""
+    def on_disk(self, surfaces: int) -> int:
+        """Bytes of a file without its particles: groups and the observables of all frames."""
         rows = -(-self.count // ROWS) * ROWS
-        return _GROUPS + _CHECKSUMS * self.count + rows * (_NUMBERS + _SURFACE * surfaces + more)
+        return _GROUPS + _CHECKSUMS * self.count + rows * (_NUMBERS + _SURFACE * surfaces)
 
-    def in_memory(self, surfaces: int, more: int = 0) -> int:
+    def in_memory(self, surfaces: int) -> int:
         """Bytes of the observables of all frames in memory."""
-        return self.count * (_OBJECTS + _SURFACE * surfaces + more)
+        return self.count * (_OBJECTS + _SURFACE * surfaces)
 
     def require_room(
         self, first: int, target: Path | None, numbers: int, surfaces: int, packed: bool, more: int = 0

@@ -54,10 +54,7 @@ def _elsewhere(one: Any, name: str, joined: Sequence[str]) -> list[str]:
     """What a dataset with values in other files is called in the sentence, or nothing."""
     if one.external is not None:
         return [f"{name}, its values are in {one.external[0][0]!r:.200}"]
-    wrong = (source.file_name for source in one.virtual_sources() if not _is_within(source, name in joined))
-    return [f"{name}, its values are in {source!r:.200}" for source in list(wrong)[:1]]
-
-
-def _is_within(source: Any, of_shards: bool) -> bool:
-    """Whether a source of a virtual dataset is in the same file, or one of our shards."""
-    return source.file_name == "." or (of_shards and _SHARD.fullmatch(source.file_name) is not None)
+    # The same file, and our shards.
+    others = (source.file_name for source in one.virtual_sources() if source.file_name != ".")
+    wrong = [file for file in others if name not in joined or not _SHARD.fullmatch(file)]
+    return [f"{name}, its values are in {file!r:.200}" for file in wrong[:1]]

@@ -1,7 +1,5 @@
-"""The arrays of the particles at a frame, for readers only: views, or copies that are made when they are read."""
+"""The arrays of the particles at a frame, for readers: copies, made when they are first read."""
 
-import gc
-import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -16,7 +14,7 @@ Read = Callable[[str], Any]
 
 
 class Snapshot:
-    """The arrays of particles at a frame by their names, each read once and never to be written.
+    """The arrays of particles at a frame by their names, each copied when it is first read, and never to be written.
 
     Args:
         read: gives "position", "velocity", "mass", "impacts", and "image", "escape_time", "absorbed_time",
@@ -24,7 +22,6 @@ class Snapshot:
         gravity: [m/s^2], or None.
         period: of the scene [m], or None.
         there: how many of them, the first ones, are there, or a mask of those (N,); None for all.
-        copies: whether what is read is copied, so that it stays as it is.
     """
 
     def __init__(
@@ -33,12 +30,10 @@ class Snapshot:
         gravity: Vector | None = None,
         period: tuple[float | None, ...] | None = None,
         there: int | NDArray[np.bool_] | None = None,
-        copies: bool = False,
     ) -> None:
-        self._read, self._gravity, self._period, self._copies = read, gravity, period, copies
+        self._read, self._gravity, self._period = read, gravity, period
         self._there: Any = there if isinstance(there, np.ndarray) else slice(there)
         self._known: dict[str, Any] = {}
-        self._views: dict[str, NDArray[Any]] = {}
 
     def read(self, name: str, frame: str) -> Any:
         """An array of the particles of a frame, which a sentence calls so.
@@ -46,23 +41,23 @@ class Snapshot:
         Raises:
             SceneError: the frame is over.
         """
-        if name in self._known or name in self._views:
-            return self._known.get(name, self._views.get(name))
-        if self._read is None:
-            raise SceneError(
-                f"{frame} is over, and frame.{name} was not read before: read it during the call, or later from the "
-                "frames of the trajectory (result.frames)"
-            )
-        if name == "energy":
-            self._known[name] = self._energy(frame)
-        elif (given := self._read(name)) is None:
-            n = len(self._read("mass")[self._there])
-            self._known[name] = np.broadcast_to(np.nan, n) if name in ("escape_time", "absorbed_time") else None
-        elif self._copies:
-            self._known[name] = _locked(np.array(given[..., self._there]))
-        else:
-            self._views[name] = _view_of(given[..., self._there])
-        return self._known.get(name, self._views.get(name))
+        if name not in self._known:
+            if self._read is None:
+                raise SceneError(
+                    f"{frame} is over, and frame.{name} was not read before: read it during the call, or later from "
+                    "the frames of the trajectory (result.frames)"
+                )
+            found = self._energy(frame) if name == "energy" else self._copied(name, self._read)
+            if found is not None:
+                found.flags.writeable = False
+            self._known[name] = found
+        return self._known[name]
+
+    def _copied(self, name: str, read: Read) -> NDArray[Any] | None:
+        if (given := read(name)) is not None:
+            return np.array(given[..., self._there])
+        never = name in ("escape_time", "absorbed_time")
+        return np.full(len(read("mass")[self._there]), np.nan) if never else None
 
     def _energy(self, frame: str) -> NDArray[np.float64]:
         r, v, mass = (self.read(name, frame) for name in ("position", "velocity", "mass"))
@@ -72,16 +67,7 @@ class Snapshot:
             length = self._period[k] if image is not None and self._period is not None else None
             if pull != 0.0:
                 energy -= pull * (r[k] if length is None else r[k] + length * image[k])
-        return _locked(np.asarray(mass * energy))
-
-    def let_go(self) -> list[str]:
-        """Give up all views. Returns the names of views still in use: their values the next frame would change."""
-        views = {name: weakref.ref(view) for name, view in self._views.items()}
-        self._views.clear()
-        if all(view() is None for view in views.values()):
-            return []
-        gc.collect()  # a cycle of references holds nothing
-        return [name for name, view in views.items() if view() is not None]
+        return np.asarray(mass * energy)
 
     def end(self) -> None:
         """Nothing more is read: the next frame begins."""
@@ -90,15 +76,3 @@ class Snapshot:
 
 # That of a frame that has no arrays.
 NOTHING = Snapshot(None)
-
-
-def _locked(array: NDArray[Any]) -> NDArray[Any]:
-    array.flags.writeable = False
-    return array
-
-
-def _view_of(array: NDArray[Any]) -> NDArray[Any]:
-    """A view that cannot be written; it lives as long as any view of it does."""
-    # NumPy makes the views of a view those of the array itself, but not where memory is not an array's.
-    locked: Any = _locked(array.view())
-    return np.asarray(memoryview(locked))

@@ -73,10 +73,7 @@ def _is_covered(openings, rules, walls, wall, r, near):
 
 @outlined
 def hit_wall(openings, rules, walls, motion, wall, near):
-    """The wall that a particle (r, v) hits that has reached this one: where this is open, a closed one at the place.
-
-    Of several closed ones it is the one that it reaches first.
-    """
+    """The wall that a particle (r, v) hits at this one: where this is open, the closed wall that it reaches first."""
     r, v = motion
     if not lets_through(openings, walls, wall, r, near):
         return wall

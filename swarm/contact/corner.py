@@ -78,13 +78,8 @@ def _sweep(walls, form, law, multipliers, step, reactions):
         remaining = Step(step.r, step.p - total(reactions), step.c)
         multiplier = None if multipliers is None else multipliers[k]
         found = reaction(form, law, multiplier, wall, remaining)
-        active = found.vector
-        reactions[k, 0], reactions[k, 1], reactions[k, 2], reactions[k, 3] = (
-            active.x,
-            active.y,
-            active.z,
-            found.constraint,
-        )
+        x, y, z = found.vector
+        reactions[k, 0], reactions[k, 1], reactions[k, 2], reactions[k, 3] = x, y, z, found.constraint
         solved = solved & found.solved
     return solved
 

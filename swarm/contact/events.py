@@ -68,7 +68,7 @@ def own_speed2(p):
 def weightless(rules, gravity, p):
     """An acceleration that counts as 0 for this particle: round-off of gravity, and of the pull of walls that bend.
 
-    Not by the size: of a floor, or of a slot between two planes, that is where they are, and says nothing of the pull.
+    The size of the scene is no measure of it: that of a floor, or of a slot between two planes, is where these are.
     """
     return _PRESSED * (norm(accelerated(gravity, ZERO, 1.0)) + own_speed2(p) / rules.bend)
 

@@ -14,7 +14,8 @@ from ..kernel.vector import dot, square
 from ..surfaces.shapes.slab import AXES
 from ..surfaces.wall_law import leave_of, lets_wait, may_end, mirrored, tries_of
 
-# A squared speed into the wall counts as 0 up to this fraction of the squared speeds before and after the law.
+# A squared speed into the wall counts as 0 up to this fraction of the squared speeds before and after the law, relative
+# to the wall and in the frame of the scene: a law adds the velocity of the wall to one that may be far smaller.
 _ROUND_OFF = 1e-30
 # Of |v|^2, the change by a law that is round-off of it or of the normal.
 KEPT = 1e-12
@@ -154,7 +155,7 @@ class Owned(Record):
             else:
                 heat = abs(square(before) - square(after)) + heat
             # False for NaN.
-            away, speed2 = dot(after, n), square(before) + square(after)
+            away, speed2 = dot(after, n), square(before) + square(after) + square(left.v) + square(u)
             is_right = (((away >= 0.0) | (away * away <= _ROUND_OFF * speed2)) & (speed2 < math.inf)) & is_right
             v = left.v
         if any(law.book == "dissipated" for law in self.each[0].laws):

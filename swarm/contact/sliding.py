@@ -25,7 +25,7 @@ MIDDLE = 1.0 - 4.0 * OUTER
 PARTS = 5
 # Sweeps until r1 and the discrete gradients agree: each gains the digits of h |v|/R.
 SWEEPS = 40
-# The last sweep but one leaves r1 off by no more than this part of itself, or of what a step may be off.
+# The last sweep but one may leave r1 off by this part of itself, or of the error that a step may have.
 _STILL, _SLACK = 64.0 * EPSILON, 0.1
 # A sweep leaves so many times the turn of the velocity in a composed step, over |v|, of what r1 was off: a third of it,
 # half that of the longest part, where the wall is as curved along the path as across.

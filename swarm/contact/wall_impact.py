@@ -14,10 +14,8 @@ from ..kernel.random import Stream, flux_maxwellian, uniforms
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, either, square
 from .laws import KEPT
-from .reflection import Bounce, energy_of, exact, from_relative, given, relative, wall_velocity
+from .reflection import Bounce, energy_of, exact, from_relative, given, relative, restore, wall_velocity
 
-# How far |v|^2 may be, in parts of it, from the energy that is kept for it.
-_NEAR = 0.1
 _NORMAL = Vec(0.0, 0.0, 1.0)
 
 
@@ -66,11 +64,8 @@ def impact_on_wall(laws, walls, gravity, wall, arriving, random):
 def by_law(laws, walls, gravity, wall, arriving, random):
     """Whether a law of a wall acts, and the `Bounce` then. A velocity that is not finite, or into the wall, is NaN."""
     r, v, mass, twice = arriving.r, arriving.v, arriving.mass, arriving.twice
-    n, moving, fall = (
-        walls.unit_normal(wall, r),
-        wall_velocity(laws.moving, walls, wall, arriving.contact()),
-        2.0 * potential(gravity, r),
-    )
+    n, fall = walls.unit_normal(wall, r), 2.0 * potential(gravity, r)
+    moving = wall_velocity(laws.moving, walls, wall, arriving.contact())
     before = relative(moving, v)
     b = dot(before, n)
     happens, after, lost, keeps, wait = False, before, 0.0, False, 0.0
@@ -90,7 +85,8 @@ def by_law(laws, walls, gravity, wall, arriving, random):
     if laws.own is not None:
         # A particle that is absorbed gives its normal momentum to the wall and keeps its velocity.
         stays = wait < math.inf
-        sent = either(keeps & stays, _restored(sent, twice - fall + work), sent)
+        speed2 = twice - fall + work
+        sent = either(keeps & stays, restore(sent, speed2, energy_of(speed2).half_inverse, True), sent)
         away = select(stays, away, 0.0)
     left = select(keeps, twice + work, square(sent) + fall)
     lost, heat = shares(laws, left - work - twice, lost)
@@ -129,13 +125,6 @@ def _own_law(laws, one, wall, at, arriving, random, acts):
         after, keeps = either(stays, after, before), keeps | (not stays)
         lost, wait = select(stays, lost, 0.0), select(stays, wait, math.inf)
     return _Own(after, lost, keeps, wait)
-
-
-def _restored(v, speed2):
-    """A velocity scaled so that its square is speed2, from within round-off, by one Newton step of the square root."""
-    moving = speed2 > 0.0
-    f = (speed2 - square(v)) * select(moving, 0.5 / select(moving, speed2, 1.0), 0.0)
-    return v * (1.0 + select(abs(f) <= _NEAR, f, 0.0))
 
 
 def shares(laws, given, lost):

@@ -9,7 +9,6 @@ from .. import observables
 from ..ball_numbers import BallNumbers
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
-from ..contact.laws import Laws
 from ..contact.wall_impact import RandomSource
 from ..methods.base import Method
 from ..particles import Particles
@@ -33,8 +32,8 @@ from .colliding.next_collision import FIXED
 from .colliding.queue import FIRST
 from .colliding.resting import warn_of_rest
 from .colliding.rows import FACE, MET, WHOLES
-from .colliding.window import END
-from .windows import windows_of
+from .colliding.window import END, windows_of
+from .reacting.described import scenery_of
 
 
 class CollidingRun(BaseRun):
@@ -53,7 +52,7 @@ class CollidingRun(BaseRun):
         self._windows = windows_of(compiled, self._clock)
         openings = compiled.openings()
         rough = box.turning is not None and box.turning.friction is not None
-        every = self._every_laws(compiled, box)
+        every = scenery_of(compiled, 0.0).each_laws()
         loses = any(one.may_dissipate or one.loses for one in every) or box.loss is not None or rough
         ends = any(one.may_end for one in every)
         # The number of collisions of each ball is in its rows.
@@ -99,10 +98,6 @@ class CollidingRun(BaseRun):
     def _is_clear(self, place: Floats, radius: float, moment: float) -> bool:
         """Whether a ball at a place (3,) is clear of the walls with a mass."""
         return True
-
-    def _every_laws(self, compiled: CompiledScene, box: Any) -> list[Laws]:
-        """Return the laws of all walls."""
-        return [box.laws]
 
     def _with_heavy(self, compiled: CompiledScene, box: Any) -> Any:
         """The `Domain` of the balls, with the walls with a mass."""
@@ -202,11 +197,11 @@ class CollidingRun(BaseRun):
     def _set_window(self) -> None:
         """Set the walls of the window, and mark the cells near them."""
         if self._windows is not None:
-            gates = self._box.gates
+            scenery, gates = self._windows.scenery(), self._box.gates
             if gates is not None:
-                gates = gates._replace(openings=self._windows.openings())
+                gates = gates._replace(openings=scenery.openings)
                 self.state = self.state._replace(openings=gates.openings)
-            self._box = self._box._replace(walls=self._windows.walls(), gates=gates)
+            self._box = self._box._replace(walls=scenery.given, gates=gates)
         self._in_parts(events.mark, self._box, self._radius, last=int(self._box.grid.x.count) + 2)
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:

@@ -5,15 +5,14 @@ from typing import Any
 import numpy as np
 
 from ..compiled_scene import CompiledScene
-from ..contact.laws import Laws
-from ..kernel.vector import ZERO, vec
+from ..kernel.vector import vec
 from ..run.observed import Observed, observed_of
 from ..scene import Scene
 from ..state import Floats
-from ..surfaces.depth import penetration
+from ..surfaces.walls import penetration
 from .balls_run import CollidingRun
 from .colliding.heavy import COUNTS, Heavy
-from .reacting.described import freedoms_of, scenery_of, walls_now
+from .reacting.described import bring_walls, freedoms_of, scenery_of, walls_now
 from .reacting.freedoms import Freedoms, alone
 
 
@@ -27,9 +26,6 @@ class HeavyRun(CollidingRun):
         r, now = vec(place), self._since(moment)
         walls = [wall.grown(radius) for wall in self._heavy.walls]
         return all(penetration(alone(wall.freedom.posed(wall.body, self._freedoms, now)), r) <= 0.0 for wall in walls)
-
-    def _every_laws(self, compiled: CompiledScene, box: Any) -> list[Laws]:
-        return scenery_of(compiled, 0.0).each_laws()
 
     def _with_heavy(self, compiled: CompiledScene, box: Any) -> Any:
         state = self.state
@@ -47,7 +43,7 @@ class HeavyRun(CollidingRun):
 
     def _set_window(self) -> None:
         if self._windows is not None:
-            self._heavy = self._heavy._replace(walls=self._windows.reacting())
+            self._heavy = self._heavy._replace(walls=self._windows.scenery().reacting)
             self._box = self._box._replace(heavy=self._heavy)
         super()._set_window()
 
@@ -64,9 +60,7 @@ class HeavyRun(CollidingRun):
         """Return the walls at a moment [s], moved there in a copy, as frames have no influence on the motion."""
         freedoms, since = Freedoms(*(array.copy() for array in self._freedoms)), self._since(moment)
         scenery = scenery_of(self._compiled, moment)
-        for wall in scenery.reacting:
-            wall.freedom.push(freedoms, since, ZERO, ZERO)
-        freedoms.time.fill(0.0)
+        bring_walls(scenery, freedoms, since)
         self._observed = observed_of(self._scene, freedoms, moment)
         return walls_now(self._compiled, scenery, freedoms)
 

@@ -27,7 +27,7 @@ from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..state import State, none_left
 from .reacting import queue as events
-from .reacting.described import freedoms_of, scenery_of, walls_now
+from .reacting.described import bring_walls, freedoms_of, scenery_of, walls_now
 from .reacting.freedoms import TOO_LONG, TOO_SHORT
 from .reacting.queue import CLOCK, NOW, TAKEN, Queue, ReactionRule, SceneWalls
 
@@ -98,8 +98,7 @@ class ReactingRun(BaseRun):
         status, particle = self._take(rule, page, latest)
         if status == Status.DONE:
             self._arrive(rule, page)
-            self._tier.kernel(events.settle)(self._scenery, self._freedoms, span)
-            self._freedoms.time.fill(0.0)
+            bring_walls(self._scenery, self._freedoms, span)
             self._clock[events.BEFORE] += span
             self._clock[NOW] = 0.0
         if page is not None:
@@ -177,7 +176,6 @@ class ReactingRun(BaseRun):
         yield events.predict, (*self._moving(rule), *part)
         yield events.take, self._moving(rule)
         yield events.arrive, (self._scenery, self._queue, rule, *part)
-        yield events.settle, (self._scenery, self._freedoms, 0.0)
         yield observables.observe, self._observing()
 
     def _summed(self) -> dict[str, Any]:

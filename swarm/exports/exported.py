@@ -72,10 +72,7 @@ class Exported:
         """The number of particles of each frame: those that come during the run are the last, in this order."""
         if not self.trajectory.has_births():
             return [len(self)] * len(self.numbers)
-        if self.trajectory.radius is not None:
-            return [int(self.trajectory.born(k)[self._rows].sum()) for k in self.numbers]
-        born = self.trajectory.birth_time[self._rows]
-        return [int((born <= time).sum()) for time in self.times.tolist()]
+        return [int(self.trajectory.born(k)[self._rows].sum()) for k in self.numbers]
 
     def moments(self) -> Iterator[ExportedFrame]:
         """The frames one after the other, each of which is written when the next is asked for.

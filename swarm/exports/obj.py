@@ -18,7 +18,7 @@ from ..scene import Scene
 from ..state import Floats
 from ..surfaces.instant import side_of
 from ..triangles.shape import Shape
-from ..triangles.shapes import shapes_of, since_start
+from ..triangles.shapes import shapes_of
 from .exported import lines_of
 
 # Bodies of one surface that are drawn: each has some 200 vertices.
@@ -51,25 +51,18 @@ def write_objects(trajectory: Any, number: int, path: Path, materials: Path) -> 
             first += len(shape.vertices)
     with open(materials, "w", encoding="ascii") as out:
         for name, colour in (("cavity", colours.CAVITY), ("solid", colours.SOLID)):
-            shade = " ".join(f"{int(colour[k : k + 2], 16) / 255.0:.4f}" for k in (1, 3, 5))
+            shade = " ".join(f"{part / 255.0:.4f}" for part in colours.rgb(colour))
             out.write(f"newmtl {name}\nKd {shade}\nd {_OPACITY[name]:g}\nillum 1\n")
 
 
 def walls_at(trajectory: Any, number: int, time: float) -> list[Shape]:
     """The walls at a frame, where they are then, if they are there; their triangles face outwards."""
     scene = trajectory.scene
-    positions = trajectory.frame(number).position if trajectory.has_particles() else np.zeros((3, 1))
-    if not any(surface.reacts() for surface in scene.surfaces):
-        drawn = shapes_of(scene, positions, time, most=_MOST)
-        return [replace(shape, triangles=outwards(scene, shape, time)) for shape in drawn]
     # Where impacts have moved them is known from the file alone.
-    seen, found = trajectory.observables, []
-    places = seen["wall_position"][number], seen["wall_orientation"][number]
-    for shape in shapes_of(scene, positions, most=_MOST):
-        turn, way = since_start(scene, shape, time, places)
-        faces = outwards(scene, shape, 0.0)
-        found.append(replace(shape, vertices=shape.vertices @ turn.T + way, triangles=faces))
-    return found
+    scene = scene.at_frame(trajectory.observables, number) if scene.reacts() else scene
+    positions = trajectory.frame(number).position if trajectory.has_particles() else np.zeros((3, 1))
+    drawn = shapes_of(scene, positions, time, most=_MOST)
+    return [replace(shape, triangles=outwards(scene, shape, time)) for shape in drawn]
 
 
 def outwards(scene: Scene, shape: Shape, time: float) -> NDArray[np.int64]:

@@ -19,6 +19,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from ..scene import Scene
 from ..triangles.shape import Shape
@@ -33,46 +34,61 @@ KINDS = ("spheres", "boxes", "cylinders", "capsules", "ellipsoids")
 def write_walls(chosen: Exported, path: Path) -> None:
     """Write the walls, as far as there are particles in the first frame.
 
-    Where walls or openings change with time, each frame has the walls of its time.
+    Where walls or openings come and go, each state of the walls is a part with cells of its own, and a step has the
+    part of its frame. Walls that only move have the same cells in all frames, and points of their own in each.
     """
-    scene, positions = chosen.trajectory.scene, chosen.trajectory.frame(chosen.numbers[0]).position
-    if scene.instants:
-        _write_changing(chosen, path)
-        return
-    drawn = shapes_of(scene, positions, most=MANY)
-    firsts = np.cumsum([0, *(len(shape.vertices) for shape in drawn)])
-    triangles = _triangles(drawn)
+    trajectory, scene = chosen.trajectory, chosen.trajectory.scene
+    positions, comes = trajectory.frame(chosen.numbers[0]).position, bool(scene.instants)
+    states: dict[tuple[int, float], int] = {}
+    found, of_steps = list[list[Shape]](), list[int]()
+    for time in chosen.times.tolist() if comes else [0.0] * len(chosen.numbers):
+        state = bisect.bisect_right(scene.instants, time), time if scene.moves() else 0.0
+        if state not in states:
+            states[state] = len(found)
+            found.append(shapes_of(scene, positions, time, most=MANY))
+        of_steps.append(states[state])
+    which, moves = np.array(of_steps), scene.moves() and not comes
+    points = [sum(len(shape.vertices) for shape in drawn) for drawn in found]
+    counts = [sum(len(shape.triangles) for shape in drawn) for drawn in found]
     with h5py.File(path, "w") as file:
-        root = vtkhdf.begin(file, {"Polygons": triangles}, [int(firsts[-1])])
-        counts = [len(shape.triangles) for shape in drawn]
-        for name, numbers in _data_of(scene, drawn).items():
-            root[f"CellData/{name}"] = np.repeat(numbers, counts)
-        moves = scene.moves()
-        if not moves:
-            root["Points"] = np.concatenate([shape.vertices for shape in drawn])
-        if not (moves or chosen.trajectory.members()):
+        root = vtkhdf.begin(file, {"Polygons": [_triangles(drawn) for drawn in found]}, points)
+        if moves:
+            _write_moved(chosen, found[0], root)
+        else:
+            root["Points"] = np.concatenate([shape.vertices for drawn in found for shape in drawn])
+        data = [_data_of(scene, drawn) for drawn in found]
+        for name in data[0]:
+            root[f"CellData/{name}"] = np.concatenate([one[name] for one in data])
+        if not (comes or moves or trajectory.members()):
             return
-        steps = vtkhdf.timed(root, chosen, int(firsts[-1]) * np.arange(len(chosen.numbers)) * moves)
+        firsts = points[0] * np.arange(len(which)) if moves else np.cumsum([0, *points])[which]
+        steps, cells = vtkhdf.timed(root, chosen, firsts), np.cumsum([0, *counts])[which]
+        steps["PartOffsets"][...] = which
+        steps["ConnectivityIdOffsets"][:, vtkhdf.CELLS.index("Polygons")] = 3 * cells
         for name in root["CellData"]:
-            steps[f"CellDataOffsets/{name}"] = np.zeros(len(chosen.numbers), np.int64)
-        _write_members(chosen, [drawn] * len(chosen.numbers), root, steps)
-        if not moves:
-            return
-        points = root.create_dataset("Points", (len(chosen.numbers) * firsts[-1], 3), np.float64)
-        seen = chosen.trajectory.observables
-        for done, number in enumerate(chosen.numbers):
-            places = seen["wall_position"][number], seen["wall_orientation"][number]
-            for shape, first in zip(drawn, done * firsts[-1] + firsts[:-1], strict=True):
-                turn, way = since_start(scene, shape, seen["time"][number], places)
-                points[first : first + len(shape.vertices)] = shape.vertices @ turn.T + way
+            steps[f"CellDataOffsets/{name}"] = cells
+        _write_members(chosen, [found[state] for state in of_steps], root, steps)
 
 
-def _data_of(scene: Scene, drawn: list[Shape]) -> dict[str, list[int]]:
-    """The data of the cells of each shape."""
+def _write_moved(chosen: Exported, drawn: list[Shape], root: Any) -> None:
+    """Write the points of all frames of walls that were so at the start."""
+    seen = chosen.trajectory.observables
+    firsts = np.cumsum([0, *(len(shape.vertices) for shape in drawn)])
+    points = root.create_dataset("Points", (len(chosen.numbers) * firsts[-1], 3), np.float64)
+    for done, number in enumerate(chosen.numbers):
+        places = seen["wall_position"][number], seen["wall_orientation"][number]
+        for shape, first in zip(drawn, done * firsts[-1] + firsts[:-1], strict=True):
+            turn, way = since_start(chosen.trajectory.scene, shape, seen["time"][number], places)
+            points[first : first + len(shape.vertices)] = shape.vertices @ turn.T + way
+
+
+def _data_of(scene: Scene, drawn: list[Shape]) -> dict[str, NDArray[np.int64]]:
+    """The data of the cells of some shapes."""
     data = {"surface": [shape.surface for shape in drawn], "solid": [int(shape.solid) for shape in drawn]}
     if parts := scene.parts:
         data["part"] = [parts.index((shape.surface, shape.place)) if shape.place else -1 for shape in drawn]
-    return data
+    counts = [len(shape.triangles) for shape in drawn]
+    return {name: np.repeat(np.array(numbers, np.int64), counts) for name, numbers in data.items()}
 
 
 def _write_members(chosen: Exported, drawn: list[list[Shape]], root: Any, steps: Any) -> None:
@@ -95,38 +111,6 @@ def _of_cells(scene: Scene, shape: Shape, of_members: Any) -> Any:
     else:
         number = shape.members if len(of_members) > 1 else 0
     return np.full(len(shape.triangles), np.nan if number is None else of_members[number], np.float64)
-
-
-def _write_changing(chosen: Exported, path: Path) -> None:
-    """Write each state of the walls as a part with cells of its own; a step has the part of its frame."""
-    scene, positions = chosen.trajectory.scene, chosen.trajectory.frame(chosen.numbers[0]).position
-    states: dict[tuple[int, float], int] = {}
-    found, of_steps = list[list[Shape]](), list[int]()
-    for time in chosen.times.tolist():
-        state = bisect.bisect_right(scene.instants, time), time if scene.moves() else 0.0
-        if state not in states:
-            states[state] = len(found)
-            found.append(shapes_of(scene, positions, time, most=MANY))
-        of_steps.append(states[state])
-    points = [sum(len(shape.vertices) for shape in drawn) for drawn in found]
-    counts = [sum(len(shape.triangles) for shape in drawn) for drawn in found]
-    with h5py.File(path, "w") as file:
-        root = vtkhdf.begin(file, {"Polygons": [_triangles(drawn) for drawn in found]}, points)
-        root["Points"] = np.concatenate([shape.vertices for drawn in found for shape in drawn])
-        which = np.array(of_steps)
-        cells = np.cumsum([0, *counts])[which]
-        steps = vtkhdf.timed(root, chosen, np.cumsum([0, *points])[which])
-        steps["PartOffsets"][...] = which
-        steps["ConnectivityIdOffsets"][:, vtkhdf.CELLS.index("Polygons")] = 3 * cells
-        data = [_data_of(scene, drawn) for drawn in found]
-        for name in data[0]:
-            numbers = [
-                np.repeat(one[name], [len(shape.triangles) for shape in drawn])
-                for one, drawn in zip(data, found, strict=True)
-            ]
-            root[f"CellData/{name}"] = np.concatenate(numbers).astype(np.int64)
-            steps[f"CellDataOffsets/{name}"] = cells
-        _write_members(chosen, [found[state] for state in of_steps], root, steps)
 
 
 def _triangles(drawn: list[Shape]) -> Any:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import FileError
 from . import driver, paths, superblock
+from .replaced import no_room
 from .sources import cause
 
 # HDF5's default chunk cache, 1 MB a dataset, would fill during 100 000 frames, which looks like a memory leak.
@@ -59,21 +60,14 @@ class AppendedFile:
         """Open the file, or raise a FileError."""
         self._size, self._block = 0, b""
         try:
-            if not self._following:
-                self._require_room()
+            # Without room for its beginning HDF5 crashes as it frees its objects.
+            if not self._following and (full := no_room(self._part, _BEGINNING)):
+                raise OSError(full)
             self._open_as("r+" if self._following else "w")
         except OSError as error:
             if not self._following:
                 self._part.unlink(missing_ok=True)
             raise FileError(f"cannot write the {self._what} {self._path}: {cause(error)}") from error
-
-    def _require_room(self) -> None:
-        """Create the file, or raise an OSError if its beginning has no room: HDF5 crashes as it frees its objects."""
-        with open(self._part, "wb", buffering=0) as file:
-            left = _BEGINNING
-            while left > 0:  # the first write may be in part
-                left -= file.write(bytes(left))
-            file.truncate(0)
 
     def _open_as(self, mode: str) -> None:
         self._handle = open(self._part, "r+b", buffering=0)  # noqa: SIM115  closed by `__exit__`
@@ -81,7 +75,7 @@ class AppendedFile:
             superblock.make_appendable(self._handle)
         # HDF5's locks would block readers.
         self._file = driver.opened_to_write(self._part, mode, libver=_FORMAT, rdcc_nbytes=_SMALL_CACHE, locking=False)
-        self._descriptor = _descriptor_of(self._file)
+        self._descriptor = int(self._file.id.get_vfd_handle())
 
     def _find(self) -> None:
         """Find the datasets of a file that is there, and begin."""
@@ -191,7 +185,3 @@ def put(dataset: Any, first: int, values: Any) -> Any:
     space.select_hyperslab((first, *(0 for _ in shape)), entries.shape)
     handle.write(h5py.h5s.create_simple(entries.shape), space, entries)
     return entries
-
-
-def _descriptor_of(file: h5py.File) -> int:
-    return int(file.id.get_vfd_handle())

@@ -9,6 +9,7 @@ from ..common.checks import flag
 from ..errors import SceneError
 from ..version import VERSION
 from . import paths
+from .replaced import replaced
 
 _ALLOW = "overwrite it (--overwrite, overwrite=True)"
 # Bytes at the beginning of a file in which its mark is.
@@ -53,6 +54,20 @@ def check_target(path: Path, overwrite: bool, what: str = "trajectory", allow: s
         raise SceneError(f"{what}: {path} exists; choose another name, or {allow}{on}")
     if path.exists():
         require_own(path, what)
+
+
+def write(path: Path, content: bytes, what: str, overwrite: bool = False) -> Path:
+    """Write a file, whole or not at all, in place of one of its own kind where it may be replaced; returns its path.
+
+    Raises:
+        SceneError: it exists and may not be replaced, or no file can be there.
+        FileError: it cannot be written.
+    """
+    target = paths.target_of(what, path)
+    check_target(target, overwrite, what)
+    with replaced(target, what) as file:
+        file.write(content)
+    return target
 
 
 def require_own(path: Path, what: str) -> None:

@@ -19,15 +19,14 @@ def no_room(path: Path | None, room: int = _BLOCK) -> str:
     """What the system says if so many bytes more cannot be written to a file, which libraries do not tell; else ""."""
     if path is None:
         return ""
-    size = path.stat().st_size if path.exists() else 0
     try:
-        try:
-            with open(path, "ab", buffering=0) as file:
-                left = room
+        with open(path, "ab", buffering=0) as file:
+            size, left = file.tell(), room
+            try:
                 while left > 0:  # the first write may be in part
                     left -= file.write(bytes(min(left, _BLOCK)))
-        finally:
-            os.truncate(path, size)
+            finally:
+                file.truncate(size)
     except OSError as error:
         return cause(error)
     return ""
@@ -83,7 +82,8 @@ def together(target: Path, files: Sequence[Path], stale: Sequence[Path] = ()) ->
         raise
     except (OSError, RuntimeError) as error:
         # HDF5's and gsd's own errors do not always say why.
-        full = "" if getattr(error, "errno", None) else no_room(_begun(parts))
+        begun = next((one for one in reversed(parts) if one.is_file()), None)
+        full = "" if getattr(error, "errno", None) else no_room(begun)
         raise FileError(f"cannot write {target}: {full or cause(error)}") from error
     finally:
         with contextlib.suppress(OSError):
@@ -95,11 +95,6 @@ def named_when_whole(target: Path) -> Iterator[Path]:
     """The name under which others write one file; as `together`."""
     with together(target, [target]) as (part,):
         yield part
-
-
-def _begun(parts: Sequence[Path]) -> Path | None:
-    """The last file that was begun."""
-    return next((one for one in reversed(parts) if one.is_file()), None)
 
 
 def _remove(folder: Path) -> None:

@@ -252,11 +252,7 @@ class Trajectory(Stored):
         k, name = self._number(k), f"particles/all/{layout.COUNTS}"
         if not self._has(name):
             raise SceneError(f"{self.path} keeps no impacts of particles: an older version wrote it; run it again")
-        with self._reading(f"the impacts of frame {k}"):
-            counts = self._of_frame(layout.COUNTS, k).astype(np.int64)
-            if (counts < 0).any():
-                raise ValueError(f"expected 0 or more, got {counts.min()} of particle {counts.argmin()}")
-        return np.asarray(counts)
+        return self._counts(k, layout.COUNTS)
 
     def collisions(self, k: int) -> NDArray[np.int64]:
         """How often each of the balls of frame k has met another one since the start, (N,).
@@ -267,8 +263,14 @@ class Trajectory(Stored):
         k, name = self._number(k), f"particles/all/{layout.COLLISIONS}"
         if not self._has(name):
             raise SceneError(f"{self.path} keeps no collisions: its particles have no radius, and do not meet")
-        with self._reading(f"the collisions of frame {k}"):
-            return np.asarray(self._of_frame(layout.COLLISIONS, k).astype(np.int64))
+        return self._counts(k, layout.COLLISIONS)
+
+    def _counts(self, k: int, kind: str) -> NDArray[np.int64]:
+        with self._reading(f"the {kind} of frame {k}"):
+            counts = self._of_frame(kind, k).astype(np.int64)
+            if (counts < 0).any():
+                raise ValueError(f"expected 0 or more, got {counts.min()} of particle {counts.argmin()}")
+        return np.asarray(counts)
 
     def escape_times(self, k: int) -> NDArray[np.float64]:
         """Times at which the particles of frame k have passed an opening of a wall [s], (N,); NaN of those inside."""
@@ -496,7 +498,7 @@ class Trajectory(Stored):
             SceneError: an argument is out of its range, the trajectory is damaged or holds no frame, or matplotlib or
                 scikit-image is not installed.
         """
-        return cast("Figure", view("plot").figure_of_trajectory(self, figsize, particles))
+        return cast("Figure", view("plot").figure_of(view("content").content_of(self), figsize, particles))
 
     def animate(
         self,

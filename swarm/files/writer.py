@@ -16,24 +16,8 @@ from ..scene import Scene
 from ..serialization import tables
 from ..state import State
 from ..views import view
-from . import checksums, paths
+from . import checksums, layout, paths
 from .appended import AppendedFile, put
-from .layout import (
-    ABSORBED,
-    ARRAYS,
-    BIRTHS,
-    BORN,
-    COLLISIONS,
-    COUNTS,
-    ESCAPES,
-    IMAGES,
-    KEPT,
-    PARTS,
-    RADII,
-    SPINS,
-    UNIT,
-    UNITS,
-)
 from .provenance import Course, makers
 from .storage import Storage
 
@@ -61,13 +45,13 @@ Column = tuple[str, tuple[int, ...], Any]
 def columns_of(scene: Scene, particles: Particles, storage: Storage) -> list[Column]:
     """The datasets of the particles of a run, which have a row for each frame."""
     laws, births = scene.compiled().laws, particles.births
-    kept: list[Column] = [(name, (3,), storage.precision) for name in PARTS]
-    kept += [(IMAGES, (3,), np.int64)] * (scene.period is not None)
-    kept += [(COUNTS, (), np.int64), *[(ESCAPES, (), np.float64)] * bool(scene.pieces.open_volumes())]
-    kept += [(ABSORBED, (), np.float64)] * (laws is not None and laws.may_end)
-    kept += [(BORN, (), np.float64)] * (births is not None and bool(births.balls))
-    kept += [(COLLISIONS, (), np.int64)] * (particles.radius is not None)
-    return kept + [(SPINS, (3,), storage.precision)] * (particles.spin is not None)
+    kept: list[Column] = [(name, (3,), storage.precision) for name in layout.PARTS]
+    kept += [(layout.IMAGES, (3,), np.int64)] * (scene.period is not None)
+    kept += [(layout.COUNTS, (), np.int64), *[(layout.ESCAPES, (), np.float64)] * bool(scene.pieces.open_volumes())]
+    kept += [(layout.ABSORBED, (), np.float64)] * (laws is not None and laws.may_end)
+    kept += [(layout.BORN, (), np.float64)] * (births is not None and bool(births.balls))
+    kept += [(layout.COLLISIONS, (), np.int64)] * (particles.radius is not None)
+    return kept + [(layout.SPINS, (3,), storage.precision)] * (particles.spin is not None)
 
 
 def size_of(scene: Scene, particles: Particles, storage: Storage, frames: int) -> int:
@@ -139,7 +123,7 @@ class TrajectoryWriter(AppendedFile):
         parameters = file.create_group("parameters")
         arrays: dict[str, Any] = {}
         texts = descriptions(self._scene, self._method, self._storage, arrays)
-        long = {f"{ARRAYS}/{name}": values for name, values in arrays.items()}
+        long = {f"{layout.ARRAYS}/{name}": values for name, values in arrays.items()}
         for name, value in {**texts, **long, "particles": self._count, **self._identity}.items():
             parameters[name] = value
         self._describe(parameters)
@@ -163,14 +147,15 @@ class TrajectoryWriter(AppendedFile):
         if repeats is not None:
             self._edges = self._element("particles/all/box/edges", (3,), np.float64, (ROWS, 3))
         everything["mass"] = self._mass
-        everything["mass"].attrs[UNIT], self._time.attrs[UNIT] = UNITS["mass"], UNITS["time"]
+        everything["mass"].attrs[layout.UNIT] = layout.UNITS["mass"]
+        self._time.attrs[layout.UNIT] = layout.UNITS["time"]
         everything["id"] = np.arange(self._count)[self._kept]
         if self._births is not None:
             if not self._births.balls:
-                everything[BIRTHS[0]] = self._births.time[self._kept]
-            everything[BIRTHS[1]] = self._births.source[self._kept]
+                everything[layout.BIRTHS[0]] = self._births.time[self._kept]
+            everything[layout.BIRTHS[1]] = self._births.source[self._kept]
         if self._radius is not None:
-            everything[RADII] = self._radius[self._kept]
+            everything[layout.RADII] = self._radius[self._kept]
         if self._bodies is not None:
             bonds = file.create_dataset("connectivity/bonds", data=self._bodies.bonds())
             bonds.attrs["particles_group"] = everything.ref
@@ -194,8 +179,8 @@ class TrajectoryWriter(AppendedFile):
         chunk = 1 if packed else _CHUNK[0], min(shape[0], _CHUNK[1]), *shape[1:]
         options = {**packed, "rdcc_nbytes": self._cache()}
         self._values[name] = self._element(f"particles/all/{name}", shape, kind, chunk, **options)
-        if name in UNITS:
-            self._values[name].attrs[UNIT] = UNITS[name]
+        if name in layout.UNITS:
+            self._values[name].attrs[layout.UNIT] = layout.UNITS[name]
 
     def _find(self) -> None:
         parameters = self._file["parameters"]
@@ -205,7 +190,7 @@ class TrajectoryWriter(AppendedFile):
             again = {"until": self.course.until, "threads": self.course.threads}
             checksums.replace(self._file, {f"parameters/{name}": value for name, value in again.items()})
         self._sums = checksums.RowSums.of(self._file)
-        kept = [name for name in KEPT if f"particles/all/{name}" in self._file]
+        kept = [name for name in layout.KEPT if f"particles/all/{name}" in self._file]
         self._edges = self._file.get("particles/all/box/edges/value")
         groups = {"particles/all": kept, "observables": list(self._file["observables"])}
         self._values, self._observables = (

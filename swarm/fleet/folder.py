@@ -9,7 +9,7 @@ from typing import Any
 from ..common.extras import needed_by
 from ..errors import SceneError
 from .plan import STEM
-from .results import KEPT, TABLES
+from .results import KEPT, TABLES, status_in
 
 # The columns of a table between its parameters and its observables.
 _ABOUT = ("state", "error", "wall_time")
@@ -52,7 +52,8 @@ def found(path: Path) -> SweepFolder:
         header, rows = _read(table) if table is not None else ([], [])
     except (OSError, ValueError, csv.Error) as error:
         raise SceneError(f"{table} is damaged: {error}") from error
-    statuses = {file.stem: status for file in sorted(path.glob("*.json")) if (status := _status(file)) is not None}
+    files = [file for file in sorted(path.glob("*.json")) if STEM.fullmatch(file.stem)]
+    statuses = {file.stem: status for file in files if (status := status_in(file)) is not None}
     if table is None and not statuses:
         raise SceneError(
             f"{path} is not the folder of a sweep: expected results.csv or results.parquet in it, got none; "
@@ -81,18 +82,6 @@ def _parameters(status: dict[str, Any]) -> dict[str, Any]:
         name: value if isinstance(value, (bool, int, float, str)) else json.dumps(value)
         for name, value in status["parameters"].items()
     }
-
-
-def _status(file: Path) -> dict[str, Any] | None:
-    """The content of a status file; None if the file is not a whole status file."""
-    if not STEM.fullmatch(file.stem):
-        return None
-    try:
-        status = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    whole = isinstance(status, dict) and {"parameters", "state", "observables"} <= set(status)
-    return status if whole and isinstance(status["observables"], dict) else None
 
 
 def _read(table: Path) -> tuple[list[str], list[dict[str, Any]]]:

@@ -53,7 +53,7 @@ def seen_of(
                 there: Any = None if births is None else births.there(moment)
                 if births is not None and births.balls:
                     there = np.concatenate([one.born(begin + k) for one in of_shards])
-                particles = Snapshot(read, task.scene.gravity, task.scene.period, there, copies=True)
+                particles = Snapshot(read, task.scene.gravity, task.scene.period, there)
                 yield len(times), {"time": moment, **joined}, particles
                 particles.end()
     finally:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from ..common.catalog import ERRORS
-from ..common.checks import flag, path_of
+from ..common.checks import path_of
 from ..common.extras import needed_by
 
 if TYPE_CHECKING:
@@ -48,22 +48,17 @@ def report(
     '1 particle in a sphere: Impact, 1 s'
     """
     source = path_of("path", path)
-    flag("overwrite", overwrite)
-    if output is None:
-        return page_of(source, None)
-    target = checked(source, path_of("output", output), overwrite)
-    page = page_of(source, target)
-    page.save(target, overwrite=overwrite)
-    return page
-
-
-def checked(source: Path, output: Path | None, overwrite: bool) -> Path:
-    """The file of the report of a run or a folder; a SceneError if it cannot be written."""
     with needed_by("a report", "report"):
         from ..pages import html
-    named = source.resolve() if source.is_dir() else source
-    target = named.with_name(f"{named.name}.html") if source.is_dir() else source.with_suffix(".html")
-    return html.checked_target(target if output is None else output, overwrite, () if source.is_dir() else (source,))
+    target = None if output is None else path_of("output", output)
+    return html.written(lambda: page_of(source, target), target, overwrite, () if source.is_dir() else (source,))
+
+
+def page_file(source: Path) -> Path:
+    """The file of the report of a run or a folder, where none is named."""
+    return (
+        source.resolve().with_name(f"{source.resolve().name}.html") if source.is_dir() else source.with_suffix(".html")
+    )
 
 
 def page_of(source: Path, target: Path | None) -> "Page":

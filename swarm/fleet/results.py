@@ -69,12 +69,9 @@ class Results:
     def find(self) -> None:
         """Take up what the status files of the folder say."""
         for variant in self.plan.variants:
-            try:
-                status = json.loads(self.status_file(variant).read_text(encoding="utf-8"))
-                known = {key: status[key] for key in ("state", "error", "wall_time", "observables")}
-            except (OSError, ValueError, KeyError, TypeError):
-                continue  # no whole status file: the state of the run is read from its trajectory
-            self._statuses[variant.stem] = known
+            # Without a whole status file the state of the run is read from its trajectory.
+            if (status := status_in(self.status_file(variant))) is not None:
+                self._statuses[variant.stem] = {key: one for key, one in status.items() if key != "parameters"}
 
     def require_own(self) -> None:
         """Raise a SceneError if the sweep would replace a file that was not made by a sweep."""
@@ -167,6 +164,16 @@ class Results:
                 file.write(text.getvalue().encode())
             else:
                 self.frame().to_parquet(file, engine="pyarrow", index=False)
+
+
+def status_in(file: Path) -> Status | None:
+    """The content of a status file; None if there is no whole one."""
+    try:
+        status = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    known = {"parameters", "state", "error", "wall_time", "observables"}
+    return status if isinstance(status, dict) and known <= status.keys() else None
 
 
 def _is_status(path: Path) -> bool:

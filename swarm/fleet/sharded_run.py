@@ -19,16 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common import interrupt
+from ..common.catalog import Observables
 from ..common.frames import Frame
 from ..errors import RunError, SceneError, WallTimeError
 from ..files import checkpoint, paths
 from ..files.lock import only_writer
 from ..run import machine
-from ..run.machine import RunEnd, start_of, warn_open
+from ..run.machine import start_of, warn_open
 from ..run.measures import Measures
 from ..run.options import Task
 from ..run.preflight import hints
 from ..run.progress import Display, display
+from ..run.result import Result
 from ..run.session import Session
 from . import connection, jobs, joined, shards
 from .jobs import PATIENCE, JobEnd, Reporter, session_of
@@ -108,7 +110,7 @@ class Sharded(Session):
         shards.tidy(paths.shards_of(self._trajectory), len(self._bounds) - 1)
 
 
-def carry_out(task: Task, session: Sharded) -> RunEnd:
+def carry_out(task: Task, session: Sharded) -> Result:
     """Carry out a run that is checked, on the cluster of its options.
 
     Raises:
@@ -137,7 +139,7 @@ def carry_out(task: Task, session: Sharded) -> RunEnd:
                 observables = _Shards(task, session, folder, bounds, fleet, show).run(measures, stop)
         end = shards.joined_end(folder, task, bounds)
         session.finish()
-        return end._replace(observables=observables, wall_time=session.wall_time())
+        return dataclasses.replace(end, observables=Observables(observables), wall_time=session.wall_time())
 
 
 def shards_of(task: Task, threads: int) -> int:

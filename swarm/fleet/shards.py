@@ -8,12 +8,9 @@ needs nothing from the client, and the scheduler carries short messages only.
 """
 
 import dataclasses
-import functools
 import itertools
-import os
-from collections.abc import Callable
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,16 +20,19 @@ from ..bodies.copies import Bodies
 from ..compiled_scene import CompiledScene
 from ..errors import SceneError
 from ..files import marks, paths
+from ..files.replaced import replaced
 from ..methods.base import Method
 from ..observables import CHUNK
 from ..particles import ARRAYS, Births, Particles
-from ..run.machine import RunEnd
 from ..run.options import RunOptions, Task
+from ..run.result import Result
 from ..run.tally import scales_of
-from ..state import Absorbed, Multipliers
+from ..state import Multipliers
 from . import sent_modules
 
 _BIRTHS = ("birth_time", "birth_source")
+# Arrays of a result: times that are left out where no particle has one, and others.
+_TIMES, _ENDS = ("escape_time", "absorbed_time"), ("impacts_per_particle", "birth_time", "collisions_per_particle")
 
 
 class Whole(NamedTuple):
@@ -83,29 +83,14 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
     births, volume = task.particles.births, task.particles.volume
     balls = () if births is None else births.balls
     whole = Whole(task.compiled, task.method, options, body, bounds, start, scales_of(task), volume, balls)
-    _replace(folder / "whole.pickle", lambda file: cloudpickle.dump(whole, file))
-    for name in ARRAYS:
-        array = getattr(task.particles, name)
-        if array is not None and not (name == "mass" and body):
-            _replace(folder / f"{name}.npy", functools.partial(_save, array))
-    if births is not None:
-        for name, array in zip(_BIRTHS, births, strict=False):
-            _replace(folder / f"{name}.npy", functools.partial(_save, array))
-
-
-def _save(*arrays_and_file: Any) -> None:
-    """Write arrays one behind the other: an archive of NumPy has checksums, which take three times as long."""
-    *arrays, file = arrays_and_file
-    for array in arrays:
-        np.save(file, array)
-
-
-def _replace(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
-    """Write a file that is there as a whole or not at all."""
-    part = paths.part_of(path)
-    with open(part, "wb") as file:
-        write(file)
-    os.replace(part, path)
+    with replaced(folder / "whole.pickle", "description of the shards") as file:
+        cloudpickle.dump(whole, file)
+    arrays = {name: getattr(task.particles, name) for name in ARRAYS if not (name == "mass" and body)}
+    arrays |= {} if births is None else dict(zip(_BIRTHS, births, strict=False))
+    for name, array in arrays.items():
+        if array is not None:
+            with replaced(folder / f"{name}.npy", "start of the shards") as file:
+                np.save(file, array)
 
 
 def clear(folder: Path) -> None:
@@ -175,29 +160,27 @@ def task_of(folder: Path, k: int) -> Task:
     return Task(whole.compiled, particles, whole.method, options, bodies, first, *of_all)
 
 
-def write_end(path: Path, end: RunEnd) -> None:
+def write_end(path: Path, end: Result) -> None:
     """Write how a shard ended."""
-    arrays: dict[str, Any] = {"position": end.particles.position, "velocity": end.particles.velocity}
-    arrays["impacts"] = end.impacts
-    if not np.isnan(end.escape_time).all():
-        arrays["escape_time"] = end.escape_time
-    if end.absorbed is not None:
-        arrays |= {f"absorbed.{name}": array for name, array in end.absorbed._asdict().items()}
-    own = {"image": end.particles.image, "spin": end.particles.spin, "collisions": end.collisions}
-    own["birth_time"] = end.birth_time
-    arrays |= {name: array for name, array in own.items() if array is not None}
-    if end.multipliers is not None:
-        arrays |= {f"multipliers.{name}": array for name, array in end.multipliers._asdict().items()}
-    _replace(path, functools.partial(_save, np.array(list(arrays)), *arrays.values()))
+    particles, multipliers = end.particles, end.multipliers
+    arrays = {name: getattr(particles, name) for name in ("position", "velocity", "image", "spin")}
+    arrays |= {name: getattr(end, name) for name in _ENDS}
+    arrays |= {name: times for name in _TIMES if not np.isnan(times := getattr(end, name)).all()}
+    arrays |= {} if multipliers is None else {f"multipliers.{k}": rows for k, rows in multipliers._asdict().items()}
+    arrays = {name: array for name, array in arrays.items() if array is not None}
+    # One behind the other: an archive of NumPy has checksums, which take three times as long.
+    with replaced(path, "end of a shard") as file:
+        for array in (np.array(list(arrays)), *arrays.values()):
+            np.save(file, array)
 
 
 # --- What the client reads ------------------------------------------------------------------------------
 
 
-def joined_end(folder: Path, task: Task, bounds: list[int]) -> RunEnd:
+def joined_end(folder: Path, task: Task, bounds: list[int]) -> Result:
     """The end of all shards; without observables and wall time."""
     n = bounds[-1]
-    whole: dict[str, NDArray[Any]] = {"escape_time": np.full((len(task.particles) // n, n), np.nan)}
+    whole: dict[str, NDArray[Any]] = {name: np.full((len(task.particles) // n, n), np.nan) for name in _TIMES}
     for k, (first, last) in enumerate(itertools.pairwise(bounds)):
         with open(end_of(folder, k), "rb") as file:
             for name in np.load(file).tolist():
@@ -212,8 +195,14 @@ def joined_end(folder: Path, task: Task, bounds: list[int]) -> RunEnd:
     particles.position, particles.velocity, particles.image = flat["position"], flat["velocity"], flat.get("image")
     particles.spin = flat.get("spin")
     loops = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("multipliers.")}
-    gone = {name.partition(".")[2]: array for name, array in flat.items() if name.startswith("absorbed.")}
-    return RunEnd(
-        particles, {}, 0.0, Multipliers(**loops) if loops else None, flat["impacts"], flat["escape_time"],
-        Absorbed(**gone) if gone else None, flat["birth_time"], flat.get("collisions"),
-    )  # fmt: skip
+    return Result(
+        particles,
+        {},
+        0.0,
+        task.options.trajectory,
+        Multipliers(**loops) if loops else None,
+        bodies=None if task.bodies is None else task.bodies.moved(particles),  # type: ignore[arg-type]
+        scene=task.scene,
+        method=task.method,
+        **{name: flat.get(name) for name in (*_TIMES, *_ENDS)},  # type: ignore[arg-type]
+    )

@@ -4,7 +4,7 @@ import contextlib
 import math
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,6 +16,7 @@ from ..common.validated import Count, Flag, Positive, Validated, choice
 from ..errors import FileError, SceneError
 from ..files.lock import only_writer
 from ..run.options import cores
+from ..run.progress import Pace, ProgressListener, progress_listener
 from ..serialization.plugins import checked_modules
 from . import sent_modules
 from .connection import Workers, connected, require_known, require_read, require_same_versions, require_shared
@@ -23,7 +24,6 @@ from .jobs import Fleet, FleetJob, Stop
 from .plan import Plan, Variant, read
 from .processes import Place, Processes
 from .results import TABLES, Results, require_written
-from .shown import Progress, Show, shown
 from .sweep_run import RunOrder, run_variant
 
 if TYPE_CHECKING:
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 # The table is written during a sweep so often at most [s], and so much longer than it takes to write.
 _TABLE_EVERY, _TABLE_SHARE = 10.0, 50.0
+# Seconds of which the pace gives the ETA: several runs.
+_WINDOW = 120.0
 
 
 @dataclass(frozen=True)
@@ -207,7 +209,7 @@ class _Runs:
         self._done, self._failed = len(results.of_state("done")), 0
         self._end = math.inf if options.walltime is None else began + options.walltime
         self._due = time.monotonic() + _TABLE_EVERY
-        self._sentence, self._stops = "", False
+        self._pace, self._stops = Pace(_WINDOW), False
 
     def carry_out(self, client: Any, first: Place | None) -> None:
         """Carry them out, by the workers of a client, or by processes of this machine."""
@@ -222,7 +224,8 @@ class _Runs:
         threads = self._options.threads or threads
         orders = ((one.number, self._order(one, threads, modules)) for one in _in_order(self._left))
         made = (FleetJob(number, run_variant, (order,)) for number, order in orders)
-        with fleet, shown(self._options.progress) as show:
+        shown = progress_listener(sentences_stay=True) if self._options.progress else contextlib.nullcontext()
+        with fleet, shown as show:
             fleet.run(made, self._note, lambda: self._look(fleet, show))
 
     def _order(self, variant: Variant, threads: int, modules: bytes | None) -> RunOrder:
@@ -242,8 +245,8 @@ class _Runs:
         self._done += outcome["state"] == "done"
         self._failed += outcome["state"] == "failed"
 
-    def _look(self, fleet: Fleet, show: Show) -> None:
-        """Show the progress, look at the time, and write the table now and then."""
+    def _look(self, fleet: Fleet, show: ProgressListener | None) -> None:
+        """Look at the time, show the progress, if it is shown, and write the table now and then."""
         now = time.monotonic()
         if now >= self._end:
             self._stop.because("walltime")
@@ -251,13 +254,21 @@ class _Runs:
         if self._stop.reason and not self._stops:
             self._stops = True
             sentences = ["stopping: the runs under way save checkpoints; a second Ctrl-C ends them at once"]
-        shares = fleet.shares.values()
-        show(
-            Progress(len(self._plan.variants), self._done, self._failed, len(shares), sum(shares), "\n".join(sentences))
-        )
+        if show is not None:
+            if sentences:
+                show.say("\n".join(sentences))
+            show.put(*line_of(self._pace, len(self._plan.variants), self._done, self._failed, fleet.shares.values()))
         if now >= self._due:
             self._results.write()
             self._due = time.monotonic() + max(_TABLE_EVERY, _TABLE_SHARE * (time.monotonic() - now))
+
+
+def line_of(pace: Pace, runs: int, done: int, failed: int, shares: Collection[float]) -> tuple[float, str]:
+    """The share of all runs that is done, with those of the runs under way, and a line about them with the ETA."""
+    ended = done + failed
+    share = (ended + sum(shares)) / runs
+    pace.note(share)
+    return share, f"{ended}/{runs} runs  {len(shares)} running{f'  {failed} failed' * bool(failed)}{pace.eta(1.0)}"
 
 
 def _in_order(variants: list[Variant]) -> Iterator[Variant]:

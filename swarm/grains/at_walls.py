@@ -39,6 +39,14 @@ def rising(wall, r0, q0, move):
     return Closing(-slope * gradient, slope * risen)
 
 
+def step_at_wall(matter, wall, grains, touches, c, i):
+    """Return the surface that the ball of contact c meets, its current move in the step, and their `Closing`."""
+    rows = touches.wall_rows
+    own = met(wall, touches.listed, touches.spans, c, grains.place[i, col.RADIUS])
+    move = vector_at(rows, c, col.COAST) + 0.5 * matter.h * vector_at(grains.speed, i, col.AFTER)
+    return own, move, rising(own, vector_at(rows, c, col.START), rows[c, col.SIZE], move)
+
+
 def velocity_at_end(wall, r1):
     """The velocity of a wall at a point at the end of a step."""
     return wall._replace(pose=wall.end).velocity(r1) if isinstance(wall, Posed) else ZERO

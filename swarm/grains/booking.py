@@ -8,11 +8,11 @@ from ..contact.wall_impact import give_work
 from ..kernel.arrays import index, unwritten
 from ..kernel.jit import Array, outlined
 from ..kernel.lines import LANES
-from ..kernel.vector import dot, norm
+from ..kernel.vector import column, dot, norm
 from . import grain_arrays as col
-from .at_walls import rising
+from .at_walls import step_at_wall
 from .contacts import closing, worse
-from .grain_arrays import set_vector, vector_at, vector_in
+from .grain_arrays import set_vector, vector_at
 from .heavy_walls import is_heavy
 from .lanes_of_pairs import (
     balls_of,
@@ -26,7 +26,7 @@ from .lanes_of_pairs import (
     turning_in,
     twist_in,
 )
-from .vessel import gives_work, met, met_member
+from .vessel import gives_work, met_member
 
 
 class ContactTotals(NamedTuple):
@@ -49,13 +49,6 @@ class ContactTotals(NamedTuple):
     absorbed_wall: Any = None
 
 
-class MemberCounts(NamedTuple):
-    """The counts of contacts with walls as they begin, by members."""
-
-    counts: Any  # `Counts`
-    places: Any  # for each wall an array (members,) int64: the number of each member in these counts
-
-
 def _lost(matter, work, gap, change):
     """The energy that the damper of a contact takes [J]; `work` is the work of its impulse times the step."""
     # From the impulse as it is, not from the law of the damper: no energy is missing, however well the step is solved.
@@ -71,14 +64,14 @@ _VIRIAL, _END, _LOST, _BOOKED = 0, 1, 2, 3
 
 def _weigh(matter, rows, q, lane, read, booked, notes):
     """Compute the numbers that are booked of a contact."""
-    s0, impulse = vector_in(rows, q + col.START, lane), vector_in(rows, q + col.IMPULSE, lane)
+    s0, impulse = column(rows, q + col.START, lane), column(rows, q + col.IMPULSE, lane)
     move = move_in(matter, rows, q, lane, slip_in(read, _SLIP, lane))
     gap, way, lost = rows[q + col.GAP, lane], closing(s0, rows[q + col.SIZE, lane], move), 0.0
     booked[_VIRIAL, lane], booked[_END, lane] = dot(s0 + 0.5 * move, impulse), gap + way.change
     if matter.pairs.damping is not None:
         lost = _lost(matter, dot(impulse, move), gap, way.change)
     if matter.pairs.friction is not None:
-        gained = dot(vector_in(rows, q + col.DRAG, lane), move) / matter.h
+        gained = dot(column(rows, q + col.DRAG, lane), move) / matter.h
         lines = _SPINS, _SPINS + col.COLUMNS_OF_BALLS
         turned = turning_in(read, *lines, col.BEFORE, lane) + turning_in(read, *lines, col.AFTER, lane)
         gained = gained - 0.5 * dot(twist_in(rows, q, lane, move), turned)
@@ -123,7 +116,7 @@ def book_pairs(matter, grains, near, touches, books, notes):
             _enter(matter, books, rows, q, lane, (index(number[i]), index(number[j])), booked)
             if matter.pairs.friction is not None:
                 listed = index(ends[e + col.PLACE, lane])
-                set_vector(near.drag, listed, 0, vector_in(rows, q + col.DRAG, lane))
+                set_vector(near.drag, listed, 0, column(rows, q + col.DRAG, lane))
     books.virial[0] += virial
     return deepest
 
@@ -131,15 +124,12 @@ def book_pairs(matter, grains, near, touches, books, notes):
 @outlined
 def book_wall(matter, law, wall, grains, touches, books, number):
     """Book the contacts with a wall; return the largest overlap [m]."""
-    rows, speed, half, begin = touches.wall_rows, grains.speed, 0.5 * matter.h, touches.wall_spans[0, number]
-    deepest = 0.0
+    rows, begin, deepest = touches.wall_rows, touches.wall_spans[0, number], 0.0
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
         one, gap, push = index(grains.number[i]), rows[c, col.GAP], rows[c, col.PUSH]
-        move = vector_at(rows, c, col.COAST) + half * vector_at(speed, i, col.AFTER)
-        own = met(wall, touches.listed, touches.spans, c, grains.place[i, col.RADIUS])
-        way = rising(own, vector_at(rows, c, col.START), rows[c, col.SIZE], move)
+        own, move, way = step_at_wall(matter, wall, grains, touches, c, i)
         deepest = max(deepest, max(gap, gap + way.change))
         books.impacts[one] += (gap <= 0.0) & (gap + way.change > 0.0)
         impulse = vector_at(rows, c, col.IMPULSE)
@@ -158,18 +148,14 @@ def book_wall(matter, law, wall, grains, touches, books, number):
 
 
 @outlined
-def count_members(matter, wall, grains, touches, members, number):
+def count_members(matter, wall, world, number):
     """Count the contacts with a wall that begin in the step, by its members."""
-    rows, half, begin = touches.wall_rows, 0.5 * matter.h, touches.wall_spans[0, number]
-    places = members.places[number]
+    grains, touches, begin = world.grains, world.touches, world.touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
-        i = index(touches.wall_ends[c])
-        r0, gap = vector_at(rows, c, col.START), rows[c, col.GAP]
-        move = vector_at(rows, c, col.COAST) + half * vector_at(grains.speed, i, col.AFTER)
-        own = met(wall, touches.listed, touches.spans, c, grains.place[i, col.RADIUS])
-        if gap <= 0.0 and gap + rising(own, r0, rows[c, col.SIZE], move).change > 0.0:
-            place = places[
-                index(met_member(wall, touches.listed, touches.spans, c, grains.place[i, col.RADIUS], r0 + move))
-            ]
-            members.counts.add(place, 1)
+        i, gap = index(touches.wall_ends[c]), touches.wall_rows[c, col.GAP]
+        _own, move, way = step_at_wall(matter, wall, grains, touches, c, i)
+        if gap <= 0.0 and gap + way.change > 0.0:
+            r = vector_at(touches.wall_rows, c, col.START) + move
+            m = met_member(wall, touches.listed, touches.spans, c, grains.place[i, col.RADIUS], r)
+            world.counts.add(world.places[number][index(m)], 1)

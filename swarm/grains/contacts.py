@@ -206,22 +206,6 @@ def apart(matter, place, i, j):
     return s + (vector_at(place, i, col.LOST) - vector_at(place, j, col.LOST))
 
 
-def _approach(matter, grains, ball, j):
-    """Return the square of the smaller distance of two balls at the ends of the step, and R_i + R_j.
-
-    `ball` is the first ball, and the sum of its velocities at both ends.
-    """
-    (i, here), place, speed = ball, grains.place, grains.speed
-    s0 = apart(matter, place, i, j)
-    move = 0.5 * matter.h * (here - (vector_at(speed, j, col.BEFORE) + vector_at(speed, j, col.AFTER)))
-    q0, q1, reach = square(s0), square(s0 + move), place[i, col.RADIUS] + place[j, col.RADIUS]
-    nearest_one = select(q1 < q0, q1, q0)
-    if matter.holds is None:
-        return nearest_one, reach
-    # Two balls that walls hold do not meet.
-    return select(place[i, col.LIGHTNESS] + place[j, col.LIGHTNESS] > 0.0, nearest_one, math.inf), reach
-
-
 def _note(rows, c, a, b, k):
     rows[c, col.ONE], rows[c, col.OTHER], rows[c, col.PLACE] = a, b, k
 
@@ -234,14 +218,24 @@ def foresee(matter, grains, course, i):
     course[i, col.EXTENT], course[i, col.YIELDING] = place[i, col.RADIUS], place[i, col.LIGHTNESS]
 
 
-def _approach_of(matter, course, ball, j):
-    """Return the result of `_approach` from the courses of both balls; `ball` is the course of the first one."""
+def _course(course, i):
+    """Return the course of a ball: its centre, its move, its radius and 1/mass."""
+    here, move = vector_at(course, i, col.FROM), vector_at(course, i, col.MOVE)
+    return here, move, course[i, col.EXTENT], course[i, col.YIELDING]
+
+
+def _approach(matter, course, ball, j):
+    """Return the square of the smaller distance of two balls at the ends of the step, and R_i + R_j.
+
+    `ball` is the course of the first one. The round-off lost from places decides nothing here.
+    """
     here, move, extent, yielding = ball
     s0 = nearest(matter.period, here, vector_at(course, j, col.FROM))
     q0, q1 = square(s0), square(s0 + (move - vector_at(course, j, col.MOVE)))
     nearest_one, reach = select(q1 < q0, q1, q0), extent + course[j, col.EXTENT]
     if matter.holds is None:
         return nearest_one, reach
+    # Two balls that walls hold do not meet.
     return select(yielding + course[j, col.YIELDING] > 0.0, nearest_one, math.inf), reach
 
 
@@ -262,11 +256,10 @@ def find_pairs(matter, near, touches):
     known, count, passed, margin = touches.used[0], touches.used[0], 0, touches.margin[0]
     for a in range(course.shape[0]):
         i = index(a)
-        extent, yielding = course[i, col.EXTENT], course[i, col.YIELDING]
-        ball = vector_at(course, i, col.FROM), vector_at(course, i, col.MOVE), extent, yielding
+        ball = _course(course, i)
         for k in range(near.first[i], near.first[i + 1]):
             b, was_on = near.mate[index(k)], near.is_on[index(k)]
-            q, reach = _approach_of(matter, course, ball, index(b))
+            q, reach = _approach(matter, course, ball, index(b))
             # Without a branch, which no processor could predict: a row that does not count is written over.
             is_on = was_on | (q < reach * reach)
             near.is_on[index(k)] = is_on
@@ -282,13 +275,13 @@ def find_pairs(matter, near, touches):
 @outlined
 def _find_missed(matter, grains, near, touches):
     """Find the pairs in contact among those that missed one another by the margin or less; return how many are new."""
-    speed, found, missed, count = grains.speed, touches.found, touches.missed, touches.used[0]
+    course, found, missed, count = touches.course, touches.found, touches.missed, touches.used[0]
     known = count
     for m in range(touches.passed[0]):
         a, b, k = missed[index(m), col.ONE], missed[index(m), col.OTHER], missed[index(m), col.PLACE]
-        i = index(a)
-        ball = i, vector_at(speed, i, col.BEFORE) + vector_at(speed, i, col.AFTER)
-        q, reach = _approach(matter, grains, ball, index(b))
+        foresee(matter, grains, course, index(a))
+        foresee(matter, grains, course, index(b))
+        q, reach = _approach(matter, course, _course(course, index(a)), index(b))
         if (q < reach * reach) & (not near.is_on[index(k)]):
             near.is_on[index(k)] = True
             _note(found, index(count), a, b, k)

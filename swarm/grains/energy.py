@@ -1,12 +1,15 @@
 """The energy that contacts store at a frame, and the state of the balls that observables and files read."""
 
+from typing import Any
+
+import numpy as np
+
 from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined
-from ..kernel.vector import norm, put
+from ..kernel.vector import norm
 from . import grain_arrays as col
 from .contacts import apart
 from .grain_arrays import vector_at
-from .held import is_held, velocity_of
 from .vessel import met
 
 
@@ -53,15 +56,15 @@ def stored(matter, walls, grains, near):
     return total, deepest
 
 
-@long_kernel
-def show(grains, state, held):
+def show(grains: Any, state: Any, held: Any) -> None:
     """Copy positions, velocities and spins into the state, in the particles' order; `held` is a `Held` or None."""
-    for k in range(grains.number.size):
-        i = index(k)
-        one, v = index(grains.number[i]), velocity_of(held, grains, i)
-        put(state.velocity, 0, one, v)
-        for axis in range(3):
-            state.position[axis, one] = grains.place[i, col.X + axis]
-            if grains.spin is not None:
-                turned = held.spin[axis, one] if is_held(held, one) else grains.spin[i, col.BEFORE + axis]
-                state.balls.spin[axis, one] = turned
+    number, begin = grains.number, slice(col.BEFORE, col.BEFORE + 3)
+    state.position[:, number] = grains.place[:, col.X : col.X + 3].T
+    state.velocity[:, number] = grains.speed[:, begin].T
+    if grains.spin is not None:
+        state.balls.spin[:, number] = grains.spin[:, begin].T
+    if held is not None:
+        waits = number[~np.isnan(held.until[number])]
+        state.velocity[:, waits] = held.velocity[:, waits]
+        if grains.spin is not None:
+            state.balls.spin[:, waits] = held.spin[:, waits]

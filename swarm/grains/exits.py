@@ -60,9 +60,8 @@ def let_out(matter, wall, world, given):
             if reaches and math.isnan(books.escape_time[one]):
                 books.escape_time[one] = time
                 if noting is not None:
-                    member = noting.places[number][
-                        index(met_member(wall, near.listed, near.spans, c, place[i, col.RADIUS], end))
-                    ]
+                    m = met_member(wall, near.listed, near.spans, c, place[i, col.RADIUS], end)
+                    member = world.places[number][index(m)]
                     back, v = into(noting.period, end), vector_at(grains.speed, i, col.AFTER)
                     struck = Struck(grains.number[i], float(member), time, back.r, v, v, 0.0)
                     noting.log.ended(noting.image, struck, back.images)

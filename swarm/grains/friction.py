@@ -20,7 +20,7 @@ from ..kernel.limits import EPSILON
 from ..kernel.vector import ZERO, cross, dot, square
 from ..surfaces.in_motion.posed import Posed
 from . import grain_arrays as col
-from .at_walls import press_at_wall, rising, velocity_at_end
+from .at_walls import press_at_wall, step_at_wall, velocity_at_end
 from .contacts import change_of, is_due, size_of, stir, worse
 from .grain_arrays import ROUNDNESS, OfWall, set_vector, vector_at
 from .heavy_walls import ease_across, is_heavy, now, react
@@ -73,12 +73,10 @@ def _facing(own, way, radius, r0, move):
     return n, _carried(own, r0 - radius * n, r0 + move - radius * n)
 
 
-def faced(wall, grains, touches, c, i, move):
-    """Return the result of `_facing` for a ball with a move."""
-    rows = touches.wall_rows
-    radius, r0 = grains.place[i, col.RADIUS], vector_at(rows, c, col.START)
-    own = met(wall, touches.listed, touches.spans, c, radius)
-    return _facing(own, rising(own, r0, rows[c, col.SIZE], move), radius, r0, move)
+def faced(matter, wall, grains, touches, c, i):
+    """Return the result of `_facing` for the ball of contact c, and its current move in the step."""
+    own, move, way = step_at_wall(matter, wall, grains, touches, c, i)
+    return *_facing(own, way, grains.place[i, col.RADIUS], vector_at(touches.wall_rows, c, col.START), move), move
 
 
 @outlined
@@ -116,13 +114,11 @@ def rub_wall(matter, law, wall, grains, touches, number, sweep):
 @outlined
 def twist_wall(matter, wall, grains, touches, number):
     """Add the twists of a wall to the spins at the end of the step; the velocities there are final."""
-    rows, speed, spin, half = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h
-    begin = touches.wall_spans[0, number]
+    rows, spin, begin = touches.wall_rows, grains.spin, touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        move = vector_at(rows, c, col.COAST) + half * vector_at(speed, i, col.AFTER)
-        n, _velocities = faced(wall, grains, touches, c, i, move)
+        n, _velocities, _move = faced(matter, wall, grains, touches, c, i)
         turned = cross(n, vector_at(rows, c, col.DRAG)) * (ROUNDNESS * rows[c, col.EASE] / grains.place[i, col.RADIUS])
         set_vector(spin, i, col.AFTER, vector_at(spin, i, col.AFTER) - turned)
 
@@ -130,15 +126,13 @@ def twist_wall(matter, wall, grains, touches, number):
 @outlined
 def book_rubbing(matter, wall, grains, near, touches, books, number):
     """Book the energy that friction at a wall takes from balls, and the work of the wall; keep its impulse."""
-    rows, speed, spin, half = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h
-    begin = touches.wall_spans[0, number]
+    rows, spin, begin = touches.wall_rows, grains.spin, touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
         one, drag = index(grains.number[i]), vector_at(rows, c, col.DRAG)
         set_vector(near.wall_drag, index(int(rows[c, col.LISTED])), 0, drag)
-        move = vector_at(rows, c, col.COAST) + half * vector_at(speed, i, col.AFTER)
-        n, (both, _last) = faced(wall, grains, touches, c, i, move)
+        n, (both, _last), move = faced(matter, wall, grains, touches, c, i)
         turned = vector_at(spin, i, col.BEFORE) + vector_at(spin, i, col.AFTER)
         gained = dot(drag, move) / matter.h - 0.5 * grains.place[i, col.RADIUS] * dot(cross(n, drag), turned)
         given = 0.5 * dot(drag, both)

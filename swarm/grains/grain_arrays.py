@@ -12,7 +12,7 @@ from ..kernel.arrays import aligned, aligned_copy, index, spaced
 from ..kernel.jit import Array
 from ..kernel.lines import LANES
 from ..kernel.record import Record
-from ..kernel.vector import Vec
+from ..kernel.vector import Vec, column, put
 
 # Columns of `Grains.place`: the centre, the round-off lost from it, the radius, 1/mass.
 X, LOST, RADIUS, LIGHTNESS = 0, 3, 6, 7
@@ -161,11 +161,11 @@ class OfPair(Record):
 
     def vector(self, k):
         """The vector in three columns."""
-        return vector_in(self.rows, self.q + k, self.lane)
+        return column(self.rows, self.q + k, self.lane)
 
     def set_vector(self, k, a):
         """Store a vector into three columns."""
-        set_vector_in(self.rows, self.q + k, self.lane, a)
+        put(self.rows, self.q + k, self.lane, a)
 
 
 def vector_at(rows: Any, c: Any, k: Any) -> Vec:
@@ -176,16 +176,6 @@ def vector_at(rows: Any, c: Any, k: Any) -> Vec:
 def set_vector(rows: Any, c: Any, k: Any, a: Vec) -> None:
     """Store a vector into three columns of a row."""
     rows[c, k], rows[c, k + 1], rows[c, k + 2] = a.x, a.y, a.z
-
-
-def vector_in(rows: Any, k: Any, lane: Any) -> Vec:
-    """The vector in three rows of a lane."""
-    return Vec(rows[k, lane], rows[k + 1, lane], rows[k + 2, lane])
-
-
-def set_vector_in(rows: Any, k: Any, lane: Any, a: Vec) -> None:
-    """Store a vector into three rows of a lane."""
-    rows[k, lane], rows[k + 1, lane], rows[k + 2, lane] = a.x, a.y, a.z
 
 
 def grains_of(position: Any, velocity: Any, radius: Any, mass: Any, spin: Any = None) -> Grains:

@@ -33,7 +33,7 @@ from ..scene import Scene
 from ..state import Balls, Floats, State, none_left
 from . import energy, lists, refused
 from . import grain_arrays as arrays
-from .booking import ContactTotals, MemberCounts
+from .booking import ContactTotals
 from .drags import Drags, carry, kept_drags, room_for, set_drags
 from .exits import stored_with_others
 from .faces import Fields
@@ -127,9 +127,8 @@ class GrainsRun(BaseRun):
         )  # fmt: skip
         if laws.send_off:
             sender = Sender(
-                laws._replace(restitution=None, friction=None), RandomSource(seeding.signed(), seeding.first),
-                self._fields.places(),
-            )  # fmt: skip
+                laws._replace(restitution=None, friction=None), RandomSource(seeding.signed(), seeding.first)
+            )
             self._world = self._world._replace(sender=sender)
         if holds is not None:
             self._world = self._world._replace(held=held_of(state.mass, rubs))
@@ -217,33 +216,26 @@ class GrainsRun(BaseRun):
             sides = crossed_of(self._matter.counters, self._counted, self._scene, born.position).side
             state.crossed.side[:, born.number] = sides
         self._world = self._world._replace(grains=arrays.beside(grains, self._rows_of(born.number)))
-        near = self._world.near
-        self._make_room(near.mate.size, near.slot.size)
-        self._list_with(kept)
+        self._make_room()
+        self._list(kept)
 
     # --- Lists ---------------------------------------------------------------------------------------------
 
-    def _list(self) -> None:
-        """Make the lists of neighbours anew from the present places."""
-        self._list_with(kept_drags(self._tier.kernel, self._world))
-
-    def _list_with(self, kept: Drags | None) -> None:
-        """Make the lists of neighbours anew, and give them the kept impulses of friction."""
-        matter, clock, kernel = self._matter, self._clock, self._tier.kernel
+    def _list(self, kept: Drags | None = None) -> None:
+        """Make the lists of neighbours anew, with the `kept` numbers of contacts if lists have changed since."""
+        clock, kernel = self._clock, self._tier.kernel
+        kept = kept_drags(kernel, self._world) if kept is None else kept
         self._wrap()
         self._drop_gone()
-        grains, near = self._world.grains, self._world.near
-        if near.wall_is_open is not None:
-            near.wall_is_open[:] = False
-        skin = float(clock[SKIN])
+        grains, skin = self._world.grains, float(clock[SKIN])
+        if self._world.near.wall_is_open is not None:
+            self._world.near.wall_is_open[:] = False
         reach = 2.0 * float(grains.place[:, arrays.RADIUS].max(initial=0.0)) + skin
-        cells, order = lists.cells_of(grains.place[:, X : X + 3], reach, matter.period)
+        cells, order = lists.cells_of(grains.place[:, X : X + 3], reach, self._matter.period)
         for rows in (grains.number, grains.place, grains.speed, grains.change, grains.spin):
             if rows is not None:
                 rows[:] = rows.take(order, axis=0)
-        while (pairs := kernel(lists.list_pairs)(matter.period, grains, near, cells, skin)) > near.mate.size:
-            near = self._make_room(pairs, near.slot.size)
-        self._list_walls(kernel, near, skin)
+        self._list_near(cells, skin)
         if self._heavy is not None:
             self._heavy.listed[:, :3] = self._heavy.place[:, X : X + 3]
         set_drags(kernel, self._world, kept)
@@ -258,28 +250,28 @@ class GrainsRun(BaseRun):
         lost += stored_with_others(self._matter, world, gone)
         self.state.dissipated[world.grains.number] += lost
         # These balls stay where they are.
-        self._tier.kernel(energy.show)(world.grains, self.state, world.held)
+        energy.show(world.grains, self.state, world.held)
         stay = {name: aligned_copy(rows[~gone]) for name, rows in world.grains._asdict().items() if rows is not None}
-        rest, near = world.grains._replace(**stay), world.near
-        members = None if near.listed is None else near.listed.size
-        near, touches = self._room(len(rest.number), near.mate.size, near.slot.size, members)
-        self._world = world._replace(grains=rest, near=near, touches=touches)
+        self._world = world._replace(grains=world.grains._replace(**stay))
+        self._make_room()
 
     def _left(self) -> float:
         """The rest of the current frame, or of the current piece of a frame [s]."""
         return (self._steps_in(self._span) - float(self._clock[DONE])) * self._matter.h
 
-    def _list_walls(self, kernel: Any, near: arrays.Neighbours, skin: float) -> None:
-        """List the balls near walls."""
+    def _list_near(self, cells: lists.CellOrder, skin: float) -> None:
+        """List pairs, and balls near walls, with as much room as needed."""
+        kernel, grains, left = self._tier.kernel, self._world.grains, self._left()
         if self._fields.reaches(skin):
             self._walls = self._walls_of(self._compiled, self._moment, skin)
-        faces, grains = self._fields.faces, self._world.grains
         while True:
-            at = kernel(lists.list_walls)(self._walls, faces, grains, near, skin, self._left())
-            members = 0 if near.used is None else int(near.used[0])
-            if at <= near.slot.size and (near.listed is None or members <= near.listed.size):
+            near = self._world.near
+            pairs = kernel(lists.list_pairs)(self._matter.period, grains, near, cells, skin)
+            touching = kernel(lists.list_walls)(self._walls, self._fields.faces, grains, near, skin, left)
+            found = pairs, touching, 0 if near.used is None else int(near.used[0])
+            if all(need <= have for need, have in zip(found, _sizes(near), strict=True)):
                 return
-            near = self._make_room(near.mate.size, at, members)
+            self._make_room(*found)
 
     def _wrap(self) -> None:
         """Wrap all balls into the periodic cell."""
@@ -301,20 +293,13 @@ class GrainsRun(BaseRun):
         near = arrays.near_of(n, walls, pairs, touching, kept, members, matter.openings is not None)
         return near, arrays.touches_of(n, walls, pairs, touching, near.listed)
 
-    def _make_room(self, pairs: int, touching: int, members: int = 0) -> arrays.Neighbours:
-        """Make room for at least these numbers of pairs, balls at walls and members of fields."""
-        near = self._world.near
-        have = 0 if near.listed is None else near.listed.size
-        wanted = (pairs, near.mate.size), (touching, near.slot.size), (members, have)
+    def _make_room(self, *found: int) -> None:
+        """Make empty lists for the present balls, with the room of the old lists, and more than the numbers `found`."""
+        near, wanted = self._world.near, zip(found or (0, 0, 0), _sizes(self._world.near), strict=True)
         pairs, touching, members = (have if need <= have else int(_MORE * need) for need, have in wanted)
-        made, touches = self._room(
-            len(self._world.grains.number), pairs, touching, None if near.listed is None else members
-        )
-        for old, new in zip(near, made, strict=True):
-            if old is not None:
-                new[: len(old)] = old
-        self._world = self._world._replace(near=made, touches=touches)
-        return made
+        number = self._world.grains.number
+        near, touches = self._room(len(number), pairs, touching, None if near.listed is None else members)
+        self._world = self._world._replace(near=near, touches=touches)
 
     def _list_again(self) -> None:
         """Make the lists anew, with a wider skin if they did not hold for a single step."""
@@ -334,13 +319,6 @@ class GrainsRun(BaseRun):
             deepest = OUTSIDE * self._scene.finite_size()
             require_free(self._scene_now(), self._seen_state(), came, deepest, instant, self._first)
         self._stored_before = self._stored_at(self._walls_of(self._compiled, instant, float(self._clock[SKIN])), 0.0)
-
-    def _switch_walls(self, span: float) -> None:
-        """At the start of a piece of the length `span`, book the energy of contacts with absent walls as lost."""
-        if self._stored_before is not None:
-            self._list()
-            self.state.dissipated[:] += self._stored_before - self._stored_at(self._walls, span)
-            self._stored_before = None
 
     def _stored_at(self, walls: Any, remaining: float) -> NDArray[np.float64]:
         """The energy that contacts of each ball with walls store with `remaining` [s] of the frame left, (N,) [J]."""
@@ -376,7 +354,11 @@ class GrainsRun(BaseRun):
         if not self._cut_short:
             self._clock[DONE] = 0.0
         if self._instants is not None:
-            self._switch_walls(span)
+            if self._stored_before is not None:
+                # The energy that contacts stored with walls is lost when these become absent.
+                self._list()
+                self.state.dissipated[:] += self._stored_before - self._stored_at(self._walls, span)
+                self._stored_before = None
             if not self._cut_short and self._fields.any_moves():
                 # The age of the lists is counted in steps, and the length of a step may change here.
                 self._list()
@@ -409,15 +391,13 @@ class GrainsRun(BaseRun):
 
     def _watched_world(self, log: Log | None) -> World:
         """The world with a log of contacts and with the counts of members of the calling thread."""
-        world, places = self._world, self._fields.places
-        if world.sender is not None:
-            # The members change when the skin becomes wider than the images of a cell.
-            world = world._replace(sender=world.sender._replace(places=places()))
-        if log is not None:
-            world = world._replace(noting=Noting(log, places(), self.state.period, self._pages()))
-        if self._tally is None:
+        world, tally = self._world, self._tally
+        noting = None if log is None else Noting(log, self.state.period, self._pages())
+        world = world._replace(noting=noting, counts=None if tally is None else tally.counts())
+        if all(one is None for one in (world.sender, world.noting, world.counts)):
             return world
-        return world._replace(members=MemberCounts(self._tally.counts(), places()))
+        # The members change when the skin becomes wider than the images of a cell.
+        return world._replace(places=self._fields.places())
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         # The start of the step that failed.
@@ -442,11 +422,10 @@ class GrainsRun(BaseRun):
         if self._instants is not None or matter.openings is not None:
             into = self.state.dissipated
             yield energy.store_at_walls, (matter, self._walls, 0.0, world.grains, world.near, into)
-        yield energy.show, (world.grains, self.state, world.held)
         yield observables.observe, self._observing()
 
     def _show(self, moment: float) -> None:
-        self._tier.kernel(energy.show)(self._world.grains, self.state, self._world.held)
+        energy.show(self._world.grains, self.state, self._world.held)
         if self._heavy is not None:
             self._observed = observed_of(self._scene, motion_of(self._heavy), moment)
         image, position = self.state.image, self.state.position
@@ -518,3 +497,8 @@ class GrainsRun(BaseRun):
         self._world = self._world._replace(near=near, touches=touches)
         super().restore(arrays, cut_short)
         self._show(self._moment)
+
+
+def _sizes(near: arrays.Neighbours) -> tuple[int, int, int]:
+    """Return the room for pairs, for balls at walls, and for members of fields."""
+    return near.mate.size, near.slot.size, 0 if near.listed is None else near.listed.size

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined
-from ..kernel.vector import ZERO, Vec
+from ..kernel.vector import ZERO, column, put
 from . import grain_arrays as col
 from .grain_arrays import set_vector, vector_at
 
@@ -35,16 +35,11 @@ def held_of(mass: Any, rubs: bool) -> Held:
     return Held(np.full(n, math.nan), np.zeros((3, n)), np.zeros((3, n)) if rubs else None, mass)
 
 
-def is_held(held, one):
-    """Whether a particle is held."""
-    return False if held is None else held.until[one] == held.until[one]
-
-
 def velocity_of(held, grains, i):
     """The velocity of a ball, or the velocity with which it leaves if it is held."""
     one = index(grains.number[i])
-    if is_held(held, one):
-        return Vec(held.velocity[0, one], held.velocity[1, one], held.velocity[2, one])
+    if held is not None and held.until[one] == held.until[one]:
+        return column(held.velocity, 0, one)
     return vector_at(grains.speed, i, col.BEFORE)
 
 
@@ -52,11 +47,10 @@ def hold(held, grains, i, until):
     """Hold a ball from now on until a time [s]."""
     one, v = index(grains.number[i]), vector_at(grains.speed, i, col.BEFORE)
     held.until[one], grains.place[i, col.LIGHTNESS] = until, 0.0
-    held.velocity[0, one], held.velocity[1, one], held.velocity[2, one] = v.x, v.y, v.z
+    put(held.velocity, 0, one, v)
     set_vector(grains.speed, i, col.BEFORE, ZERO)
     if held.spin is not None:
-        for axis in range(3):
-            held.spin[axis, one] = grains.spin[i, col.BEFORE + axis]
+        put(held.spin, 0, one, vector_at(grains.spin, i, col.BEFORE))
         set_vector(grains.spin, i, col.BEFORE, ZERO)
 
 
@@ -69,6 +63,5 @@ def let_go(held, grains, now, h):
         if held.until[one] <= now + _WHOLE * h:
             set_vector(grains.speed, i, col.BEFORE, velocity_of(held, grains, i))
             if held.spin is not None:
-                for axis in range(3):
-                    grains.spin[i, col.BEFORE + axis] = held.spin[axis, one]
+                set_vector(grains.spin, i, col.BEFORE, column(held.spin, 0, one))
             held.until[one], grains.place[i, col.LIGHTNESS] = math.nan, 1.0 / held.mass[one]

@@ -1,10 +1,10 @@
 """The contacts of pairs in groups, one contact a lane; one after the other they take three times as long.
 
-The contacts form slices, each of several parts, and a group has one contact of each part of a slice. So its balls are
-far from one another, while their rows are in the second cache. The numbers of a group are stored by columns, from which
-LLVM makes vectors: a group is computed by a loop over its lanes that reads from balls, a loop without a branch, and a
-loop that writes to balls, which may be the same. Sweeps go over all groups. A group in which two contacts share a ball
-is done in parts, so that each contact begins with the result of the contacts before it.
+Contacts are cut into slices, a slice into as many parts as a group has lanes, and a group has one contact of each part.
+So its balls are far from one another, while their rows are in the second cache. The numbers of a group are stored by
+columns, from which LLVM makes vectors. A group is computed in three loops over its lanes: one reads from balls, one
+computes without a branch, and one writes to balls, which may be the same. Sweeps go over all groups. A group in which
+two contacts share a ball is done in parts, so that each contact begins with the result of the contacts before it.
 """
 
 import math
@@ -14,7 +14,7 @@ import numpy as np
 from ..kernel.arrays import fetch, index, kept, unwritten
 from ..kernel.jit import is_known, outlined, select
 from ..kernel.lines import FOUR, LANES, add_from_lanes, into_lanes
-from ..kernel.vector import Vec, cross, dot, square
+from ..kernel.vector import Vec, column, cross, dot, put, square
 from . import grain_arrays as col
 from .cell import nearest
 from .contacts import (
@@ -32,7 +32,7 @@ from .contacts import (
     worse,
 )
 from .friction import arm_of, rubbed
-from .grain_arrays import ROUNDNESS, OfPair, set_vector_in, vector_at, vector_in, with_lanes
+from .grain_arrays import ROUNDNESS, OfPair, vector_at, with_lanes
 
 
 def of_group(touches, g):
@@ -76,13 +76,13 @@ def read_ends(table, ends, e, tile, k):
 
 def slip_in(tile, k, lane):
     """v_i - v_j, from `read_ends`."""
-    return vector_in(tile, k, lane) - vector_in(tile, k + FOUR, lane)
+    return column(tile, k, lane) - column(tile, k + FOUR, lane)
 
 
-def turning_in(tile, one, other, column, lane):
+def turning_in(tile, one, other, k, lane):
     """R_i w_i + R_j w_j; `one` and `other` are the rows of a tile in which the columns of both balls begin."""
-    turned = vector_in(tile, one + column, lane) * tile[one + col.ARM, lane]
-    return turned + vector_in(tile, other + column, lane) * tile[other + col.ARM, lane]
+    turned = column(tile, one + k, lane) * tile[one + col.ARM, lane]
+    return turned + column(tile, other + k, lane) * tile[other + col.ARM, lane]
 
 
 def pair_at(touches, g, lane):
@@ -93,7 +93,7 @@ def pair_at(touches, g, lane):
 
 def move_in(matter, rows, q, lane, difference):
     """The change of s in a step, from the difference of the velocities at its end."""
-    return vector_in(rows, q + col.COAST, lane) + 0.5 * matter.h * difference
+    return column(rows, q + col.COAST, lane) + 0.5 * matter.h * difference
 
 
 # --- At the start of a step ------------------------------------------------------------------------------
@@ -140,9 +140,9 @@ def _begin_group(matter, grains, near, touches, group):
         for k in range(begin, end):
             lane, listed = index(k), index(ends[e + col.PLACE, index(k)])
             if matter.pairs.friction is not None:
-                set_vector_in(rows, q + col.DRAG, lane, vector_at(near.drag, listed, 0))
+                put(rows, q + col.DRAG, lane, vector_at(near.drag, listed, 0))
             if matter.pairs.rolling is not None:
-                set_vector_in(rows, q + col.ROLL, lane, vector_at(near.drag, listed, col.KEPT_ROLL))
+                put(rows, q + col.ROLL, lane, vector_at(near.drag, listed, col.KEPT_ROLL))
     for k in over_lanes(lanes) if is_whole else range(begin, end):
         _begin_contact(matter, rows, q, index(k), read)
     add_from_lanes(grains.change, col.GIVEN, ends, e, read, _IMPULSES, lanes)
@@ -153,20 +153,20 @@ def _begin_group(matter, grains, near, touches, group):
 def _begin_contact(matter, rows, q, lane, read):
     """Begin to solve for a contact of a group."""
     half, one, other = 0.5 * matter.h, _PLACE, _PLACE + col.COLUMNS_OF_BALLS
-    s0 = nearest(matter.period, vector_in(read, one + col.X, lane), vector_in(read, other + col.X, lane))
-    s0 = s0 + (vector_in(read, one + col.LOST, lane) - vector_in(read, other + col.LOST, lane))
+    s0 = nearest(matter.period, column(read, one + col.X, lane), column(read, other + col.X, lane))
+    s0 = s0 + (column(read, one + col.LOST, lane) - column(read, other + col.LOST, lane))
     reach = read[one + col.RADIUS, lane] + read[other + col.RADIUS, lane]
     eases = read[one + col.LIGHTNESS, lane], read[other + col.LIGHTNESS, lane]
     one, other = _SPEED, _SPEED + col.COLUMNS_OF_BALLS
-    v, u = vector_in(read, one + col.BEFORE, lane), vector_in(read, other + col.BEFORE, lane)
-    v1, u1 = vector_in(read, one + col.AFTER, lane), vector_in(read, other + col.AFTER, lane)
+    v, u = column(read, one + col.BEFORE, lane), column(read, other + col.BEFORE, lane)
+    v1, u1 = column(read, one + col.AFTER, lane), column(read, other + col.AFTER, lane)
     move = half * ((v + v1) - (u + u1))
     size = math.sqrt(s0.x * s0.x + s0.y * s0.y + s0.z * s0.z)
     gap, ease = reach - size, eases[0] + eases[1]
-    set_vector_in(rows, q + col.START, lane, s0)
+    put(rows, q + col.START, lane, s0)
     rows[q + col.SIZE, lane], rows[q + col.GAP, lane], rows[q + col.EASE, lane] = size, gap, ease
     rows[q + col.EASES, lane], rows[q + col.EASES + 1, lane] = eases
-    set_vector_in(rows, q + col.COAST, lane, half * (v - u))
+    put(rows, q + col.COAST, lane, half * (v - u))
     damping = None
     if matter.pairs.damping is not None:
         damping = matter.pairs.damping / math.sqrt(ease) / matter.h
@@ -176,17 +176,17 @@ def _begin_contact(matter, rows, q, lane, read):
     rows[q + col.PUSH, lane], rows[q + col.GAIN, lane] = push, gain
     rows[q + col.SCALE, lane] = scale_of(matter, push, (size_of(v1 - u1), size_of(v1) + size_of(u1)), ease)
     impulse = push * way.along
-    set_vector_in(rows, q + col.IMPULSE, lane, impulse)
+    put(rows, q + col.IMPULSE, lane, impulse)
     if matter.pairs.friction is not None:
         rows[q + col.LEVERS, lane] = eases[0] * read[_TURNS + col.LEVER - FOUR, lane]
         rows[q + col.LEVERS + 1, lane] = eases[1] * read[_TURNS + col.LEVER, lane]
         rows[q + col.NEARNESS, lane] = 1.0 / reach
-        drag = vector_in(rows, q + col.DRAG, lane) * lasting(gap)
-        set_vector_in(rows, q + col.DRAG, lane, drag)
+        drag = column(rows, q + col.DRAG, lane) * lasting(gap)
+        put(rows, q + col.DRAG, lane, drag)
         impulse = impulse + drag
         give_twist(rows, q, lane, read, _TWISTS, twist_in(rows, q, lane, move))
     if matter.pairs.rolling is not None:
-        set_vector_in(rows, q + col.ROLL, lane, vector_in(rows, q + col.ROLL, lane) * lasting(gap))
+        put(rows, q + col.ROLL, lane, column(rows, q + col.ROLL, lane) * lasting(gap))
     give_impulse(rows, q, lane, read, _IMPULSES, impulse)
 
 
@@ -255,8 +255,8 @@ def is_in(lanes, k):
 
 def _give(given, k, lane, to_first, to_second):
     """Write the changes of both balls of a contact into eight rows, of which the fourth and the eighth are 0."""
-    set_vector_in(given, k, lane, to_first)
-    set_vector_in(given, k + FOUR, lane, to_second)
+    put(given, k, lane, to_first)
+    put(given, k + FOUR, lane, to_second)
     given[k + FOUR - 1, lane], given[k + 2 * FOUR - 1, lane] = 0.0, 0.0
 
 
@@ -279,9 +279,9 @@ def push_pairs(matter, grains, touches):
         rows, q, ends, e = of_group(touches, g)
         lanes = touches.lanes[index(g)]
         for k in over_lanes(lanes_between(0, lanes)):
-            impulse = vector_in(rows, q + col.IMPULSE, index(k))
+            impulse = column(rows, q + col.IMPULSE, index(k))
             if matter.pairs.friction is not None:
-                impulse = impulse + vector_in(rows, q + col.DRAG, index(k))
+                impulse = impulse + column(rows, q + col.DRAG, index(k))
             give_impulse(rows, q, index(k), given, 0, impulse)
         add_from_lanes(grains.change, col.GIVEN, ends, e, given, 0, lanes_between(0, lanes))
 
@@ -302,8 +302,8 @@ def twist_pairs(matter, grains, touches):
 
 def twist_in(rows, q, lane, move):
     """s x J/R of a pair, where s changes by `move`; J has both impulses, so that no angular momentum is lost."""
-    s = vector_in(rows, q + col.START, lane) + 0.5 * move
-    impulse = vector_in(rows, q + col.IMPULSE, lane) + vector_in(rows, q + col.DRAG, lane)
+    s = column(rows, q + col.START, lane) + 0.5 * move
+    impulse = column(rows, q + col.IMPULSE, lane) + column(rows, q + col.DRAG, lane)
     return cross(s * rows[q + col.NEARNESS, lane], impulse)
 
 
@@ -319,14 +319,14 @@ _PART, _TWIST, _WORST, _PRESSED, _OFF, _GIVEN = 0, 8, 16, 17, 18, 19
 def _press(matter, rows, q, lane, is_due, begun, share):
     """Improve the impulse of a contact of a group if it is due; return its `Closing`, its size, change and error."""
     move = move_in(matter, rows, q, lane, slip_in(begun, _SLIP, lane))
-    way = closing(vector_in(rows, q + col.START, lane), rows[q + col.SIZE, lane], move)
+    way = closing(column(rows, q + col.START, lane), rows[q + col.SIZE, lane], move)
     damping = None if matter.pairs.damping is None else rows[q + col.DAMPING, lane]
     wanted, _slope = pressed(matter, damping, rows[q + col.GAP, lane], way.change)
     push = improved(rows[q + col.PUSH, lane], wanted, rows[q + col.GAIN, lane])
-    old = vector_in(rows, q + col.IMPULSE, lane)
+    old = column(rows, q + col.IMPULSE, lane)
     more, part = changed(old, push * way.along, share)
     rows[q + col.PUSH, lane] = select(is_due, push, kept(rows[q + col.PUSH, lane]))
-    set_vector_in(rows, q + col.IMPULSE, lane, old + _if(is_due, part))
+    put(rows, q + col.IMPULSE, lane, old + _if(is_due, part))
     return way, push, part, weight_of(matter.pairs) * (size_of(more) * rows[q + col.SCALE, lane])
 
 
@@ -343,11 +343,11 @@ def _rub(matter, rows, q, lane, is_due, begun, given, sweep):
     turning = turning_in(begun, _TURNING - col.AFTER, _TURNING + FOUR - col.AFTER, col.AFTER, lane)
     slip = slip_in(begun, _SLIP, lane) + ease * part - cross(turning, arm)
     slip = slip - (dot(slip, way.along) * over) * way.along
-    old = vector_in(rows, q + col.DRAG, lane)
+    old = column(rows, q + col.DRAG, lane)
     before = old - (dot(old, way.along) * over) * way.along
     new = rubbed(before, slip, sweep.inverse * (ease * (1.0 + ROUNDNESS * square(arm))), matter.pairs.friction * push)
     more, rub = changed(old, new, sweep.share)
-    set_vector_in(rows, q + col.DRAG, lane, old + _if(is_due, rub))
+    put(rows, q + col.DRAG, lane, old + _if(is_due, rub))
     give_impulse(rows, q, lane, given, _PART, part + rub)
     give_twist(rows, q, lane, given, _TWIST, cross(arm, rub))
     return worse(size_of(more) * rows[q + col.SCALE, lane], off), off

@@ -13,20 +13,19 @@ from ..kernel.vector import ZERO, norm
 from ..lanes.watching.log import Lasted, Log, Struck
 from ..surfaces.periodic.period import into
 from . import grain_arrays as col
-from .at_walls import rising
+from .at_walls import step_at_wall
 from .contacts import closing
 from .friction import across, faced
 from .grain_arrays import OfWall, set_vector, vector_at
 from .held import velocity_of
 from .lanes_of_pairs import move_in, pair_at
-from .vessel import met, met_member
+from .vessel import met_member
 
 
 class Noting(NamedTuple):
     """The log of contacts, and the arrays that its rows need besides the contacts."""
 
     log: Log
-    places: Any  # for each wall an array (members,) int64: the number of each member in the scene
     period: Any  # `Period` of the cell, or None
     image: Any  # (3, N) the cells in which the balls were when the lists were made, or None
 
@@ -60,18 +59,17 @@ def note_pairs(matter, grains, near, touches, time):
 
 @outlined
 def note_wall(matter, law, wall, grains, near, touches, noting, given):
-    """Add a step to the notes of the contacts with a wall; `given` is the number of the wall, and the time [s]."""
-    rows, speed, half, (number, time) = touches.wall_rows, grains.speed, 0.5 * matter.h, given
+    """Log the contacts with a wall that have ended in the step; `given` is the number of the wall, and the time [s]."""
+    rows, (number, time) = touches.wall_rows, given
     begin = touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
         if _note(matter, law.friction is not None, OfWall(rows, c), near.wall_drag, time):
-            place, v = index(int(rows[c, col.LISTED])), vector_at(speed, i, col.BEFORE)
+            place, v = index(int(rows[c, col.LISTED])), vector_at(grains.speed, i, col.BEFORE)
             set_vector(near.wall_drag, place, col.ARRIVED, v)
             if noting.log.slip is not None:
-                move = vector_at(rows, c, col.COAST) + half * vector_at(speed, i, col.AFTER)
-                n, (both, _last) = faced(wall, grains, touches, c, i, move)
+                n, (both, _last), _move = faced(matter, wall, grains, touches, c, i)
                 set_vector(near.wall_drag, place, col.SLIP, across(v - 0.5 * both, n))
 
 
@@ -108,18 +106,17 @@ def log_pairs(matter, world, time):
 def log_wall(matter, wall, world, given):
     """Log the contacts with a wall that have ended in the step; `given` is the number of the wall, and the time [s]."""
     grains, near, touches, noting = world.grains, world.near, world.touches, world.noting
-    rows, speed, half, (number, time) = touches.wall_rows, grains.speed, 0.5 * matter.h, given
+    rows, (number, time) = touches.wall_rows, given
     begin = touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         if rows[c, col.GAP] > 0.0:
             i = index(touches.wall_ends[c])
             radius = grains.place[i, col.RADIUS]
-            move = vector_at(rows, c, col.COAST) + half * vector_at(speed, i, col.AFTER)
-            own = met(wall, touches.listed, touches.spans, c, radius)
-            if rows[c, col.GAP] + rising(own, vector_at(rows, c, col.START), rows[c, col.SIZE], move).change <= 0.0:
+            _own, _move, way = step_at_wall(matter, wall, grains, touches, c, i)
+            if rows[c, col.GAP] + way.change <= 0.0:
                 r, v = vector_at(grains.place, i, col.X), velocity_of(world.held, grains, i)
-                member = noting.places[number][index(met_member(wall, touches.listed, touches.spans, c, radius, r))]
+                member = world.places[number][index(met_member(wall, touches.listed, touches.spans, c, radius, r))]
                 place = index(int(rows[c, col.LISTED]))
                 slip = ZERO if noting.log.slip is None else vector_at(near.wall_drag, place, col.SLIP)
                 at = Struck(grains.number[i], float(member), time, r, v, v, 0.0)

@@ -19,11 +19,11 @@ from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, square
 from ..surfaces.in_motion.posed import Posed
 from . import grain_arrays as col
-from .at_walls import rising
+from .at_walls import step_at_wall
 from .grain_arrays import set_vector, vector_at
 from .held import hold
 from .overlaps import BALL, WALL
-from .vessel import gives_work, met, met_member
+from .vessel import gives_work, met_member
 
 
 class Sender(NamedTuple):
@@ -31,7 +31,6 @@ class Sender(NamedTuple):
 
     laws: Any  # `Laws` without restitution and friction, which act during a contact
     source: RandomSource
-    places: Any  # for each wall an array (members,) int64: the number of each member among the walls of the laws
 
 
 class _Facing(Record):
@@ -57,14 +56,13 @@ def send_off(matter, wall, world, given_time):
     wall, and the time [s].
     """
     grains, touches, (number, time) = world.grains, world.touches, given_time
-    rows, begin, half, status = touches.wall_rows, touches.wall_spans[0, number], 0.5 * matter.h, Status.DONE.value
+    begin, status = touches.wall_spans[0, number], Status.DONE.value
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
-        i, gap = index(touches.wall_ends[c]), rows[c, col.GAP]
+        i, gap = index(touches.wall_ends[c]), touches.wall_rows[c, col.GAP]
         if gap > 0.0:
-            own = met(wall, touches.listed, touches.spans, c, grains.place[i, col.RADIUS])
-            move = vector_at(rows, c, col.COAST) + half * vector_at(grains.speed, i, col.AFTER)
-            if gap + rising(own, vector_at(rows, c, col.START), rows[c, col.SIZE], move).change <= 0.0:
+            own, _move, way = step_at_wall(matter, wall, grains, touches, c, i)
+            if gap + way.change <= 0.0:
                 after = own._replace(pose=own.end) if isinstance(own, Posed) else own
                 one = _act(wall, after, world, (number, c, i), time)
                 status = one if status == Status.DONE or one == Status.SENT_WRONG else status
@@ -86,7 +84,7 @@ def _act(wall, own, world, at, time):
         # Another contact, or a law, has pushed the ball back.
         return Status.DONE.value
     one, touches = index(grains.number[i]), world.touches
-    member = sender.places[number][index(met_member(wall, touches.listed, touches.spans, c, radius, r))]
+    member = world.places[number][index(met_member(wall, touches.listed, touches.spans, c, radius, r))]
     random = sender.source.of_impact(one, books.ended[one], sender.laws)
     books.ended[one] += 1
     before, mass = v + 2.0 * away * n, 1.0 / grains.place[i, col.LIGHTNESS]
@@ -107,8 +105,8 @@ def _act(wall, own, world, at, time):
         turned = given(u, v - before)
         give_work(books, row, one, 0.5 * mass * (bounce.work - turned))
     heat = book_energy(books, (row, one, one), mass, bounce)
-    if world.members is not None:
-        world.members.counts.give(member, heat, bounce.wait)
+    if world.counts is not None:
+        world.counts.give(member, heat, bounce.wait)
     if books.absorbed_time is not None and bounce.wait == math.inf:
         books.absorbed_time[one], books.absorbed_wall[one] = time, np.int32(member)
         return Status.LEASE_ENDED.value

@@ -89,11 +89,12 @@ class World(NamedTuple):
     touches: Any
     books: Any
     followed: Any = None  # `Followed` of `Passing`, where there are counters
-    members: Any = None  # `MemberCounts`, or None
+    counts: Any = None  # `Counts` of the contacts with members of walls, or None
     sender: Any = None  # `Sender`, or None where no wall sends balls off
     held: Any = None  # `Held`, or None where no wall holds balls
     noting: Any = None  # `Noting`, or None in a run without a log of contacts
     heavy: Any = None  # `Grains` of the walls with a mass, or None
+    places: Any = None  # for each wall an array (members,) int64: the number of each member in the scene; or None
 
 
 # --- Of one step -----------------------------------------------------------------------------------------
@@ -370,8 +371,8 @@ def _book(matter, walls, world):
         book_rolling_pairs(grains, near, touches, books)
     for k, wall in enumerate(walls.each):
         deepest = max(book_wall(matter, matter.walls[k], wall, grains, touches, books, k), deepest)
-        if world.members is not None:
-            count_members(matter, wall, grains, touches, world.members, k)
+        if world.counts is not None:
+            count_members(matter, wall, world, k)
         if matter.walls[k].friction is not None:
             book_rubbing(matter, wall, grains, near, touches, books, k)
         if matter.walls[k].rolling is not None:

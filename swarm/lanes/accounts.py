@@ -13,8 +13,11 @@ def lose(state, i, before, after):
         state.dissipated[i] += 0.5 * (before - after) * state.mass[i]
 
 
-def book(walls, state, i, wall, change, given, loses):
-    """Book a change (before, after) of twice the energy per mass at a wall, which gives so much of it by its motion."""
+def book(walls, state, i, wall, change, given, loses, booked=0.0):
+    """Book a change (before, after) of twice the energy per mass at a wall, which gives so much of it by its motion.
+
+    A part of this work may be booked already.
+    """
     before, after = change
     if not isinstance(walls, Carried):
         lose(state, i, before, after)
@@ -23,27 +26,7 @@ def book(walls, state, i, wall, change, given, loses):
     given = given if loses else after - before
     state.energy[i] = 0.5 * after
     state.dissipated[i] += 0.5 * (before - after + given) * state.mass[i]
-    book_work(walls, state, i, wall, given)
-
-
-def book_work(walls, state, i, wall, given):
-    """Book twice the work per mass of a wall, if it moves."""
-    if isinstance(walls, Carried):
-        state.impulse[walls.length() + walls.row(wall), i] += 0.5 * given * state.mass[i]
-
-
-def book_step(walls, state, i, wall, change, given, loses):
-    """Book a change (before, after) of twice the energy per mass in a short step, of which `given` is booked."""
-    before, after = change
-    if not isinstance(walls, Carried):
-        lose(state, i, before, after)
-        return
-    state.energy[i] = 0.5 * after
-    if loses:
-        state.dissipated[i] += 0.5 * (before - after + given) * state.mass[i]
-    else:
-        # What is left is round-off.
-        book_work(walls, state, i, wall, after - before - given)
+    state.impulse[walls.length() + walls.row(wall), i] += 0.5 * (given - booked) * state.mass[i]
 
 
 # --- Of a lane ------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from ..surfaces.in_motion.moving import Aimed, Carried
 from ..surfaces.time_of_impact import aim
 from .accounts import add_to_rows, add_work
 from .contact_ends import end_contacts, end_hard_contacts, impulses_before
-from .escape import meet_openings, step_out, step_out_lanes
+from .escape import face_lanes, let_out_lanes, step_out, step_out_lanes
 from .flight import aims, go
 from .hit_member import of_lane, pick, picks
 from .periodic import return_lanes, return_stepped, return_stepped_lanes
@@ -182,7 +182,8 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
         counters.count_flights(method, gravity, share, lanes, live)
     return_lanes(method, walls, gravity, state, lanes, live)
     if state.openings is not None:
-        meet_openings(state.openings, method, walls, gravity, share, lanes, live)
+        at_openings = face_lanes if method.steps_into_walls else let_out_lanes
+        at_openings(state.openings, method, walls, gravity, share, lanes, live)
     if method.solves is not None:
         solve(method, walls, gravity, state.multipliers, lanes, live)
     for watch in watches:

@@ -10,7 +10,7 @@ from ..kernel.gravity import potential
 from ..kernel.jit import long_kernel, outlined
 from ..kernel.vector import ZERO, column, put, square
 from ..surfaces.in_motion.moving import Carried
-from .accounts import book_step, lose
+from .accounts import book, lose
 from .carried import NOT_CARRIED, carry
 from .escape import let_out
 from .lane_arrays import booked, speed2_scale
@@ -30,34 +30,24 @@ def careful_block(method, walls, gravity, share):
 
 def _take_care(method, walls, gravity, share, i):
     """A short step of particle i; whether it moves on."""
-    state, contacts = share.state, share.state.contacts
-    if share.counters is None:
-        _step(method, walls, gravity, share, i)
-        if state.period is not None:
-            return_particle(state.period, walls, state, i)
-    else:
-        _count_step(method, walls, gravity, share, i)
+    state, contacts, counters = share.state, share.state.contacts, share.counters
+    left = contacts.remaining[i]
+    before = _moment(state, i, left if left > 0.0 else share.span)
+    _step(method, walls, gravity, share, i)
+    end = _moment(state, i, contacts.remaining[i])
+    if counters is not None:
+        counters.count_step(share, i, before, end)
+    if state.period is not None:
+        return_particle(state.period, walls, state, i)
     r = column(state.position, 0, i)
+    if counters is not None and state.period is not None and square(r - end.r) > 0.0:
+        counters.come_back(share, i, before, end.r, end._replace(r=r))
     closed = isinstance(walls, Carried) and _have_closed(walls, method, r, contacts.remaining[i])
     return not closed and not contacts.short_steps[i] > _MOST_SHORT_STEPS
 
 
-@outlined
-def _count_step(method, walls, gravity, share, i):
-    """A short step of particle i, and what it crosses."""
-    state, counters, remaining = share.state, share.counters, share.state.contacts.remaining
-    left = remaining[i]
-    before = ParticleMoment(
-        column(state.position, 0, i), column(state.velocity, 0, i), left if left > 0.0 else share.span
-    )
-    _step(method, walls, gravity, share, i)
-    end = ParticleMoment(column(state.position, 0, i), column(state.velocity, 0, i), remaining[i])
-    counters.count_step(share, i, before, end)
-    if state.period is not None:
-        return_particle(state.period, walls, state, i)
-        back = ParticleMoment(column(state.position, 0, i), end.v, end.remaining)
-        if square(back.r - end.r) > 0.0:
-            counters.come_back(share, i, before, end.r, back)
+def _moment(state, i, remaining):
+    return ParticleMoment(column(state.position, 0, i), column(state.velocity, 0, i), remaining)
 
 
 @outlined
@@ -122,7 +112,7 @@ def _step(method, walls, gravity, share, i):
     for s in range(walls.length(), impulses.shape[0]):
         given_work += 2.0 * impulses[s, 0]
     change = p.twice, end.twice_energy
-    book_step(walls, state, i, contacts.met[i], change, given_work, method.laws.loses)
+    book(walls, state, i, contacts.met[i], change, given_work, method.laws.loses, given_work)
     contacts.sliding[i] += end.used
     share.note_stay(i, end.used)
     contacts.remaining[i] = max(remaining - end.used, 0.0)

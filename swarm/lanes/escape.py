@@ -47,14 +47,6 @@ def detain(share, p, wall, remaining, wait):
     return False
 
 
-def meet_openings(openings, method, walls, gravity, share, lanes, live):
-    """Handle the lanes that are at openings at the end of their flights."""
-    if method.steps_into_walls:
-        face_lanes(openings, method, walls, gravity, share, lanes, live)
-    else:
-        let_out_lanes(openings, method, walls, gravity, share, lanes, live)
-
-
 def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
     """Let lanes out that have flown to a wall where it is open, if no closed wall is at the same place.
 
@@ -75,13 +67,18 @@ def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
         if leads_on(now, wall, r):
             (flier.r, flier.v), lanes.wall[i] = through(now, gravity, wall, (r, v)), -1.0
             continue
-        p, counters = index(lanes.particle[i]), share.counters
-        if counters is not None:
-            counters.retire(share.state, lanes, p, i)
-        escape(share, p, wall, r, v, flier.remaining)
-        if counters is not None:
-            counters.load(share.state, lanes, p, i)
-        flier.remaining, lanes.wall[i] = 0.0, -1.0
+        _escape_lane(share, lanes, i, wall, flier.remaining)
+
+
+def _escape_lane(share, lanes, i, wall, remaining):
+    """Book that a lane escapes with so much of its frame left [s], and end this."""
+    flier, p, counters = lanes.lane(i), index(lanes.particle[i]), share.counters
+    if counters is not None:
+        counters.retire(share.state, lanes, p, i)
+    escape(share, p, wall, flier.r, flier.v, remaining)
+    if counters is not None:
+        counters.load(share.state, lanes, p, i)
+    flier.remaining, lanes.wall[i] = 0.0, -1.0
 
 
 # --- Steps into walls ------------------------------------------------------------------------------------
@@ -144,14 +141,9 @@ def step_out(method, walls, share, lanes, i):
             out = float(k)
     if out < 0.0:
         return False
-    p, counters = index(lanes.particle[i]), share.counters
     leave_contacts(method, walls, share, lanes, i)
-    if counters is not None:
-        counters.retire(share.state, lanes, p, i)
-    escape(share, p, out, flier.r, flier.v, method.seconds(flier.remaining))
-    if counters is not None:
-        counters.load(share.state, lanes, p, i)
-    flier.remaining, lanes.wall[i], lanes.marked[i] = 0.0, -1.0, True
+    _escape_lane(share, lanes, i, out, method.seconds(flier.remaining))
+    lanes.marked[i] = True
     return True
 
 

@@ -15,7 +15,7 @@ from .field_hits import hit_of_lane, keep_hit, seek
 from .in_moving_cells import go_through_moving
 from .lane_arrays import Flying
 from .periodic import cut_steps
-from .table import EIGHT, STRIDE, LaneView, Rows, copy_lane, marked_lanes
+from .table import STRIDE, LaneView, Rows, copy_lane, marked_lanes, whole_eights
 
 # After the first safe step to walls in any motion all lanes take so many more in a pass.
 _STRIDES = 3
@@ -165,20 +165,13 @@ def aims(walls, gravity):
 
 def _stride(walls, gravity, lanes, live):
     """Safe steps of all lanes to walls in any motion."""
-    course = lanes.course
     if aims(walls, gravity):
         _stride_open(walls, gravity, lanes, _aim_at_moving(walls, gravity, lanes, live))
         return
-    for i in range(index(live)):
-        lane = lanes.lane(i)
-        strides.start(walls, gravity, course, i, lane.r, lane.v, lane.remaining)
-    for i in range(index(live)):
-        lane = lanes.lane(i)
-        strides.stride(walls, gravity, course, i, lane.r, lane.v, lane.remaining, True)
+    _of_flights(strides.start, walls, gravity, lanes, live)
+    _of_flights(strides.stride, walls, gravity, lanes, live, True)
     for _round in range(_STRIDES):
-        for i in range(index(live)):
-            lane = lanes.lane(i)
-            strides.stride(walls, gravity, course, i, lane.r, lane.v, lane.remaining, False)
+        _of_flights(strides.stride, walls, gravity, lanes, live, False)
 
 
 def _aim_at_moving(walls, gravity, lanes, live):
@@ -214,7 +207,7 @@ def _aim_at_moving(walls, gravity, lanes, live):
 
 
 def _of_flights(ask, walls, gravity, lanes, live, *given):
-    """Ask of the flight of every lane what `aim` does."""
+    """Ask something of the flight of every lane."""
     for i in range(index(live)):
         lane = lanes.lane(i)
         ask(walls, gravity, lanes.course, i, lane.r, lane.v, lane.remaining, *given)
@@ -241,8 +234,8 @@ def _stride_open(walls, gravity, lanes, some):
     Side by side in tables of their own: one lane alone takes as long as a vector of them, which the last one fills.
     """
     course, starts = lanes.course, unwritten((Open.COUNT, STRIDE), np.float64)
-    beside, count = unwritten((aim.rows(walls), STRIDE), np.float64), EIGHT * ((some + EIGHT - 1) // EIGHT)
-    for k in range(index(count)):
+    beside, count = unwritten((aim.rows(walls), STRIDE), np.float64), whole_eights(some)
+    for k in range(count):
         i, one = index(lanes.order[index(min(k, some - 1))]), Open(starts, k)
         lane = lanes.lane(i)
         for row in aim.open_rows(walls):
@@ -250,17 +243,17 @@ def _stride_open(walls, gravity, lanes, some):
         beside[strides.TIME, k], beside[strides.MET, k] = 0.0, -1.0
         one.r, one.v, one.remaining = lane.r, lane.v, lane.remaining
     if aim.has_series(walls):
-        for k in range(index(count)):
+        for k in range(count):
             one = Open(starts, k)
             aim.start_series(walls, gravity, beside, k, one.r, one.v, one.remaining)
-        for k in range(index(count)):
+        for k in range(count):
             one = Open(starts, k)
             aim.prove(walls, gravity, beside, k, one.r, one.v, one.remaining, True)
-    for k in range(index(count)):
+    for k in range(count):
         one = Open(starts, k)
         strides.stride(walls, gravity, beside, k, one.r, one.v, one.remaining, True)
     # A contact takes them from its course, where a proof has left those of its hit.
-    for k in range(index(count)):
+    for k in range(count):
         aim.put_angles(walls, beside, k, Open(starts, k).remaining - beside[strides.TIME, k])
     _put_waves(walls, beside, count, False)
     for k in range(index(some)):
@@ -367,8 +360,8 @@ def _go_on_beside(walls, gravity, lanes, some, tries, most):
     """
     course, rows = lanes.course, len(walls.each) * flights.COURSE
     starts, beside = unwritten((Open.COUNT, STRIDE), np.float64), unwritten((rows, STRIDE), np.float64)
-    count = EIGHT * ((some + EIGHT - 1) // EIGHT)
-    for k in range(index(count)):
+    count = whole_eights(some)
+    for k in range(count):
         i, one = index(lanes.order[index(min(k, some - 1))]), Open(starts, k)
         lane = lanes.lane(i)
         copy_lane(course, i, beside, k, rows)
@@ -382,14 +375,14 @@ def _go_on_beside(walls, gravity, lanes, some, tries, most):
 
 def _try_on_beside(walls, gravity, starts, beside, count, tries):
     """The last tries of so many lanes that fall, from their starts, and the first safe steps of the others."""
-    for k in range(index(count)):
+    for k in range(count):
         flights.leave_free(walls, gravity, beside, 0, k, Open(starts, k).remaining)
     for left in range(tries, -1, -1):
-        for k in range(index(count)):
+        for k in range(count):
             flights.nearer(walls, gravity, beside, 0, k)
-        for k in range(index(count)):
+        for k in range(count):
             flights.aimed(walls, gravity, beside, 0, k, left == 0)
-    for k in range(index(count)):
+    for k in range(count):
         one = Open(starts, k)
         flights.step_off(walls, gravity, beside, 0, k, one.r, one.v)
 
@@ -398,13 +391,13 @@ def _step_beside(walls, gravity, starts, beside, count, most):
     """So many safe steps of so many lanes, from their starts, or fewer if the last has no need of more."""
     for _step in range(most):
         more = 0
-        for k in range(index(count)):
+        for k in range(count):
             one = Open(starts, k)
             hit = flights.end(walls.at(one.remaining), gravity, beside, 0, k, (one.r, one.v), stops=True)
             more += select((hit.wall < 0.0) & (hit.time < one.remaining), 1, 0)
         if more == 0:
             break
-        for k in range(index(count)):
+        for k in range(count):
             one = Open(starts, k)
             flights.step(walls.at(one.remaining), gravity, beside, 0, k, one.r, one.v)
 

@@ -34,7 +34,7 @@ MIDDLE = _BACK
 
 
 class UnderWay(Record):
-    """The lanes that are under way, closed up."""
+    """The lanes that are under way, closed up: they fly straight or fall, past facets at rest."""
 
     rows: Array  # what is known of each lane
     time: Array  # how far it has come
@@ -59,41 +59,53 @@ class UnderWay(Record):
 
     def facets(self, mesh):
         """The facets of the mesh."""
-        raise NotImplementedError
+        return mesh
 
     def look_up(self, mesh, n):
         """Look up what `see` asks for, of so many lanes."""
 
     def see(self, gravity, mesh, i):
         """Look where a lane is now in the frame of the mesh; its place."""
-        raise NotImplementedError
+        return self.now(gravity, i)[0]
 
     def now(self, gravity, i):
         """The position and the velocity of a lane now in the frame of the mesh, as it was seen."""
-        raise NotImplementedError
+        r, v, t = column(self.rows, START, i), column(self.rows, SPEED, i), self.time[i]
+        return r + displacement(gravity, v, t), accelerated(gravity, v, t)
 
     def until_out(self, gravity, mesh, i, first, last):
         """How long a lane surely is among the cells from one place to another one."""
-        raise NotImplementedError
+        place, pace = self.now(gravity, i)
+        return until_out(gravity, mesh.grid, first, last, place, pace)
 
     def until_in(self, gravity, mesh, i):
         """Until when a lane that is outside of the grid surely does not come into it."""
-        raise NotImplementedError
+        return _until_in(gravity, mesh.grid, self, i)
 
     def may_meet(self, gravity, mesh, i, cone):
         """Whether a lane may move towards a facet with a normal in this cone on its way through its cell."""
-        raise NotImplementedError
+        # At the start of the way or at its end
+        v = column(self.rows, SPEED, i)
+        if gravity is None:
+            return not cone.is_left(v)
+        now, then = accelerated(gravity, v, self.time[i]), accelerated(gravity, v, self.until[i])
+        return not (cone.is_left(now) & cone.is_left(then))
 
     def keep_way(self, gravity, mesh, i):
         """Keep what `way` asks for, if that is long to compute: a lane may look at many blocks of facets."""
 
     def way(self, gravity, mesh, i):
         """That way, as `FlightInCell`."""
-        raise NotImplementedError
+        v, time = column(self.rows, SPEED, i), self.time[i]
+        at, pace = column(self.rows, MIDDLE, i), accelerated(gravity, v, time)
+        return flight_in(mesh.grid, at, pace, gravity, self.until[i] - time)
 
     def meet(self, gravity, mesh, maybe, some):
         """Take the hits of lanes with so many facets that they may meet."""
-        raise NotImplementedError
+        for n in range(some):
+            i = index(maybe.lane[n])
+            r, v = column(self.rows, START, i), column(self.rows, SPEED, i)
+            self.take(i, hit_of(mesh, gravity, r, v, index(maybe.facet[n])))
 
     # --- From step to step ---
 
@@ -149,54 +161,6 @@ def under_way(kind):
     )  # fmt: skip
 
 
-class UnderWayAtRest(UnderWay):
-    """Those that fly straight or fall, past facets at rest."""
-
-    def facets(self, mesh):
-        """As of `UnderWay`."""
-        return mesh
-
-    def see(self, gravity, mesh, i):
-        """As of `UnderWay`."""
-        return self.now(gravity, i)[0]
-
-    def now(self, gravity, i):
-        """As of `UnderWay`."""
-        r, v, t = column(self.rows, START, i), column(self.rows, SPEED, i), self.time[i]
-        return r + displacement(gravity, v, t), accelerated(gravity, v, t)
-
-    def until_out(self, gravity, mesh, i, first, last):
-        """As of `UnderWay`."""
-        place, pace = self.now(gravity, i)
-        return until_out(gravity, mesh.grid, first, last, place, pace)
-
-    def until_in(self, gravity, mesh, i):
-        """As of `UnderWay`."""
-        return _until_in(gravity, mesh.grid, self, i)
-
-    def may_meet(self, gravity, mesh, i, cone):
-        """As of `UnderWay`."""
-        # At the start of the way or at its end
-        v = column(self.rows, SPEED, i)
-        if gravity is None:
-            return not cone.is_left(v)
-        now, then = accelerated(gravity, v, self.time[i]), accelerated(gravity, v, self.until[i])
-        return not (cone.is_left(now) & cone.is_left(then))
-
-    def way(self, gravity, mesh, i):
-        """As of `UnderWay`."""
-        v, time = column(self.rows, SPEED, i), self.time[i]
-        at, pace = column(self.rows, MIDDLE, i), accelerated(gravity, v, time)
-        return flight_in(mesh.grid, at, pace, gravity, self.until[i] - time)
-
-    def meet(self, gravity, mesh, maybe, some):
-        """As of `UnderWay`."""
-        for n in range(some):
-            i = index(maybe.lane[n])
-            r, v = column(self.rows, START, i), column(self.rows, SPEED, i)
-            self.take(i, hit_of(mesh, gravity, r, v, index(maybe.facet[n])))
-
-
 class Maybe(Record):
     """The facets that lanes may meet in their cells.
 
@@ -244,7 +208,7 @@ def ask_for(table, row, size):
 @outlined
 def go_through(gravity, facets, before, lanes, live):
     """The first hits of every live lane with facets that have so many walls before them, or that found before."""
-    go_from_cell_to_cell(under_way(UnderWayAtRest), gravity, facets, before, lanes, live)
+    go_from_cell_to_cell(under_way(UnderWay), gravity, facets, before, lanes, live)
 
 
 def go_from_cell_to_cell(under, gravity, mesh, before, lanes, live):

@@ -51,7 +51,6 @@ class UnderWayInMotion(UnderWay):
     width, own = ROWS + 23, 8
 
     def begin(self, i, lane, found):
-        """As of `UnderWay`."""
         UnderWay.begin(self, i, lane, found)
         self.rows[_REMAINING, i], self.rows[_FAST, i] = lane.remaining, norm(lane.v)
 
@@ -69,18 +68,15 @@ class UnderWayInMotion(UnderWay):
         )  # fmt: skip
 
     def facets(self, mesh):
-        """As of `UnderWay`."""
         return mesh.body
 
     def look_up(self, mesh, n):
-        """As of `UnderWay`."""
         track = mesh.drive.track
         if track is not None:
             for i in range(index(n)):
                 self.rows[_PIECE, i] = float(track.piece_at(self.time[i] - self.rows[_REMAINING, i]))
 
     def see(self, gravity, mesh, i):
-        """As of `UnderWay`."""
         rows = self.rows
         seen = mesh.on_piece(int(rows[_PIECE, i])).seen(self.flight(gravity, i), self.time[i])
         put(rows, _PLACE, i, seen.r)
@@ -90,11 +86,9 @@ class UnderWayInMotion(UnderWay):
         return seen.r
 
     def now(self, gravity, i):
-        """As of `UnderWay`."""
         return column(self.rows, _PLACE, i), column(self.rows, _PACE, i)
 
     def until_out(self, gravity, mesh, i, first, last):
-        """As of `UnderWay`."""
         cells, most = mesh.body.grid, _LONGEST * mesh.drive.time_scale
         seen, longest = self.seen(mesh, gravity, i), self.last[i] - self.time[i]
         # The bound of the acceleration grows with the time that it holds for.
@@ -105,11 +99,9 @@ class UnderWayInMotion(UnderWay):
         return select(time < within, time, within)
 
     def until_in(self, gravity, mesh, i):
-        """As of `UnderWay`."""
         return _until_in(gravity, mesh, self, i)
 
     def may_meet(self, gravity, mesh, i, cone):
-        """As of `UnderWay`."""
         seen, span = self.seen(mesh, gravity, i), self.until[i] - self.time[i]
         # The velocity is around the mean of those at both ends of its way.
         jerk, half = seen.jerk(span), 0.5 * span
@@ -120,7 +112,6 @@ class UnderWayInMotion(UnderWay):
         return not cone.is_left(seen.v + change, norm(change) + off)
 
     def keep_way(self, gravity, mesh, i):
-        """As of `UnderWay`."""
         rows, seen, span = self.rows, self.seen(mesh, gravity, i), self.until[i] - self.time[i]
         at = column(rows, MIDDLE, i)
         way = flight_in(mesh.body.grid, at, seen.v, seen.a, span, seen.jerk(span))
@@ -131,14 +122,12 @@ class UnderWayInMotion(UnderWay):
             rows[row, i] = number
 
     def way(self, _gravity, _mesh, i):
-        """As of `UnderWay`."""
         rows = self.rows
         at, way, bent = (column(rows, row, i) for row in (MIDDLE, _WAY, _BENT))
         slow, weak, off, bends, reach = (rows[row, i] for row in _NUMBERS)
         return FlightInCell(at, way, bent, slow, weak, CurveBound(off, bends, reach))
 
     def meet(self, gravity, mesh, maybe, some):
-        """As of `UnderWay`."""
         for first in range(0, some, LANES):
             _meet(gravity, mesh, self, maybe, index(first), min(int(some) - int(first), LANES))
 

@@ -13,7 +13,7 @@ from ..kernel.record import Record
 from ..kernel.vector import Vec, column, norm, put, square
 from ..methods import contract as methods
 from ..surfaces.in_motion.moving import Carried
-from ..surfaces.presence.ajar import Faced
+from ..surfaces.presence.doors import Faced
 from ..surfaces.time_of_impact import aim, flights
 from .table import EIGHT, STRIDE, Advanced, Number, Rows, copy_lane, table
 

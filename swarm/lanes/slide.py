@@ -67,7 +67,7 @@ def slide_block(kind, method, walls, gravity, share, lanes):
 
 @outlined
 def _over(method, share, lanes, live, going):
-    """Whether the call ends before the next pass: (status, particle), a halt or one that got nowhere since a look."""
+    """The status with which the call ends before the next pass, or DONE: (status, the particle that got nowhere)."""
     place, passes = going
     if passes >= share.halt[0]:
         return Status.INTERRUPTED.value, 0

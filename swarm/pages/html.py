@@ -13,7 +13,6 @@ from markupsafe import Markup
 from ..common.checks import flag
 from ..errors import SceneError
 from ..files import marks, paths
-from ..files.replaced import replaced
 from ..version import VERSION
 
 _HERE = Path(__file__).parent
@@ -50,10 +49,7 @@ class Page:
             SceneError: the name has another suffix, or the file exists.
             FileError: the file cannot be written.
         """
-        target = checked_target(path, overwrite, self.sources)
-        with replaced(target, "report") as file:
-            file.write(self.html.encode())
-        return target
+        return marks.write(checked_target(path, overwrite, self.sources), self.html.encode(), "report", overwrite)
 
     def _repr_html_(self) -> str:
         style = f"width: 100%; height: {_HEIGHT}px; border: 1px solid #8A8A8A; border-radius: 6px"
@@ -66,7 +62,7 @@ def checked_target(path: Any, overwrite: bool, sources: tuple[Path, ...]) -> Pat
     target = paths.target_of("report", path)
     if target.suffix.lower() not in _SUFFIXES:
         raise SceneError(f"report: expected a file name that ends in .html, got {target}")
-    paths.check_distinct({"report": target}, dict.fromkeys(("file that it is of", "file"), None) | _named(sources))
+    paths.check_distinct({"report": target}, {f"{source.name} that it is of": source for source in sources})
     marks.check_target(target, overwrite, "report")
     return target
 
@@ -80,10 +76,6 @@ def written(made: Callable[[], Page], path: Any, overwrite: bool, sources: tuple
     if path is not None:
         page.save(path, overwrite=overwrite)
     return page
-
-
-def _named(sources: tuple[Path, ...]) -> dict[str, Path | None]:
-    return {f"{source.name} that it is of": source for source in sources}
 
 
 def filled(template: str, **content: Any) -> str:

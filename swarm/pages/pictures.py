@@ -6,15 +6,12 @@ import io
 import re
 from typing import Any, NamedTuple
 
-import numpy as np
 from markupsafe import Markup
 from matplotlib import rc_context
 from matplotlib.text import Text
 
 from ..pictures import plots, style
 from ..pictures.drawn import Drawn
-from ..triangles.shape import Shape
-from ..triangles.shapes import shapes_of
 from ..words.amounts import amount, many
 from ..words.content import Content
 
@@ -55,25 +52,16 @@ def _how_many(content: Content, name: str) -> str:
 
 def _placed(content: Content, name: str, k: int, dark: bool) -> Any:
     """A figure of the particles of a frame."""
-    figure = plots.picture_of_places(content, name, _shapes(content, k), _PLACES, _SHOWN)
+    figure = plots.picture_of_places(content, name, plots.walls_of(content, k), _PLACES, _SHOWN)
     for text in figure.findobj(Text) if dark else ():
         text.set_color(style.ink())  # its grey is meant for a light background
     return figure
 
 
-def _shapes(content: Content, k: int) -> list[Shape]:
-    """The walls as they are at a frame."""
-    still, seen = content.scene, content.seen
-    if still.reacts():
-        still = still.placed(seen["wall_position"][k], seen["wall_orientation"][k])
-    frame = content.frames.get("end", content.frames.get("start"))
-    return shapes_of(still, np.zeros((3, 1)) if frame is None else frame.position, float(seen["time"][k]))
-
-
 def of_series(content: Content) -> list[PagePicture]:
     """The time series that say something, a graph each, and the speeds."""
     found = []
-    for title, draw in plots.graphs_of(content, _shapes(content, -1)):
+    for title, draw in plots.graphs_of(content):
         with style.applied():
             figure = style.picture(*_GRAPH)
             draw(figure.subplots())

@@ -10,7 +10,7 @@ import tomli_w
 
 from ..errors import SceneError
 from ..files.storage import Storage
-from ..serialization.tables import FILES, NamedMethod, files_in
+from ..serialization.tables import FILES, NamedMethod, files_in, texts_in
 
 # User code in a scene file, and the keys of files.
 _CODE = re.compile(r"([A-Za-z_][\w.]*):[A-Za-z_]\w*")
@@ -85,17 +85,9 @@ def _of_scene_file(trajectory: Any, text: str) -> Again:
 
 def plugins_of(document: Any) -> str:
     """The options of a command for the code that a scene file names."""
-    modules = sorted({module for text in _texts_of(document) for module in _CODE.findall(text)})
+    found = (_CODE.fullmatch(text) for key, text in texts_in(document) if key not in FILES)
+    modules = sorted({code[1] for code in found if code and not code[0].startswith(_ARRAY)})
     return "".join(f" --plugins {shlex.quote(module)}" for module in modules)
-
-
-def _texts_of(place: Any, key: str = "") -> Iterator[str]:
-    """The whole texts of a document but the names of files, where code may be named."""
-    if isinstance(place, (dict, list)):
-        for name, value in place.items() if isinstance(place, dict) else enumerate(place):
-            yield from _texts_of(value, str(name))
-    elif isinstance(place, str) and key not in FILES and _CODE.fullmatch(place) and not place.startswith(_ARRAY):
-        yield place
 
 
 # --- From the first frame --------------------------------------------------------------------------------

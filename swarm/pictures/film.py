@@ -2,7 +2,6 @@
 
 import bisect
 import contextlib
-import os
 import shutil
 import signal
 from pathlib import Path
@@ -18,6 +17,7 @@ from PIL import Image
 from ..common import checks
 from ..errors import FileError, SceneError
 from ..files import marks, paths
+from ..files.replaced import named_when_whole
 from ..files.sources import cause
 from ..state import Floats
 from ..surfaces.plane import shown_as
@@ -81,17 +81,14 @@ def animate(trajectory: Any, path: Any, frames: int, fps: float, size: Any, part
     numbers = np.unique(np.linspace(0, last, min(most, last + 1)).round().astype(int)).tolist()
     with style.applied():
         film = _Film(trajectory, numbers, pixels, shown)
-    part = paths.part_of(target)
-    try:
-        with style.applied(), matplotlib.rc_context(ffmpeg), writer.saving(film.picture, str(part), film.picture.dpi):
-            for k in numbers:
-                film.show(k)
-                writer.grab_frame()
-        os.replace(part, target)
-    except (OSError, CalledProcessError) as error:
-        raise FileError(f"cannot write the film {target}: {_reason(error)}") from error
-    finally:
-        part.unlink(missing_ok=True)
+    with named_when_whole(target) as part, style.applied(), matplotlib.rc_context(ffmpeg):
+        try:
+            with writer.saving(film.picture, str(part), film.picture.dpi):
+                for k in numbers:
+                    film.show(k)
+                    writer.grab_frame()
+        except (OSError, CalledProcessError) as error:
+            raise FileError(f"cannot write the film {target}: {_reason(error)}") from error
     return target
 
 

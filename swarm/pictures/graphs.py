@@ -61,7 +61,11 @@ def lines(axes: Any, graph: series.Graph, drawn: Curves, limit: float | None = R
         _words(axes, "needs two frames")
         return
     if graph.is_error:
-        drawn = {name: (times, _error(values)) for name, (times, values) in drawn.items()}
+        # From their logarithms.
+        drawn = {
+            name: (times, np.where(values <= series.NOTHING, 0.0, 10.0**values))
+            for name, (times, values) in drawn.items()
+        }
         if not any(values.any() for _times, values in drawn.values()):
             _words(axes, "none in any frame")
             return
@@ -106,11 +110,6 @@ def _merged(drawn: Curves) -> Curves:
     return {"total, all kinetic": drawn["total"]} | {
         n: curve for n, curve in rest.items() if n not in ("total", "kinetic")
     }
-
-
-def _error(values: Floats) -> Floats:
-    """Errors from their logarithms."""
-    return np.where(values <= series.NOTHING, 0.0, 10.0**values)
 
 
 def _titled(graph: series.Graph, drawn: Curves) -> str:

@@ -1,6 +1,5 @@
 """A run in one picture: time series that show whether it went well, speeds, and the particles."""
 
-import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -47,11 +46,6 @@ def draw_plot(trajectory: Any, target: Path) -> None:
         figure.savefig(part, metadata=marks.of_picture(part))
 
 
-def figure_of_trajectory(trajectory: Any, figsize: Any, particles: int) -> style.Picture:
-    """The picture of a `Trajectory`; see `figure_of`."""
-    return figure_of(content_of(trajectory), figsize, particles)
-
-
 def figure_of(content: Content, figsize: Any, particles: int) -> style.Picture:
     """The picture, in which at most so many particles are drawn; as high as its plots need where no size is given."""
     most = checks.count("particles", particles)
@@ -64,13 +58,10 @@ def figure_of(content: Content, figsize: Any, particles: int) -> style.Picture:
 
 
 def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.Picture:
-    (wide, high), scene, times = size, content.scene, content.seen["time"]
+    (wide, high), scene = size, content.scene
     last = "end" if "end" in content.frames else "start"
     end = content.inside(last) if last in content.frames else None
-    still = scene
-    if scene.reacts():
-        still = scene.placed(content.seen["wall_position"][-1], content.seen["wall_orientation"][-1])
-    shapes = shapes_of(still, np.zeros((3, 1)) if end is None else most_of(end.position), float(times[-1]))
+    shapes = walls_of(content, -1)
     plots, spread = _shown(content, shapes), speeds.of_frames(content)
     count, width = len(plots) + bool(spread), wide * (1.0 if end is None else _SERIES)
     lines = sentences.in_lines(verdicts.marked(content), width)
@@ -93,6 +84,13 @@ def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.
     sentences.write_below(below, lines, text)
     picture.suptitle(words.title(content), fontsize=12)
     return picture
+
+
+def walls_of(content: Content, k: int) -> list[Shape]:
+    """The walls as they are at frame k, around most of the particles that are known last."""
+    seen, frame = content.seen, content.frames.get("end", content.frames.get("start"))
+    around = np.zeros((3, 1)) if frame is None else most_of(frame.position)
+    return shapes_of(content.scene.at_frame(seen, k), around, float(seen["time"][k]))
 
 
 def _shown(content: Content, shapes: list[Shape]) -> dict[str, graphs.Curves]:
@@ -177,19 +175,15 @@ def _places(figure: Any, content: Content, name: str, shapes: list[Shape], most:
 # --- Of one thing each, for pages ------------------------------------------------------------------------
 
 
-def graphs_of(content: Content, shapes: list[Shape]) -> list[tuple[str, Callable[[Any], None]]]:
+def graphs_of(content: Content) -> list[tuple[str, Callable[[Any], None]]]:
     """The graphs that say something: what each shows, and the function that draws it in axes."""
     shown: list[tuple[str, Callable[[Any], None]]] = []
-    for group, curves in _shown(content, shapes).items():
+    for group, curves in _shown(content, walls_of(content, -1)).items():
         title = series.GRAPHS[group].across(content.scene.plane).name
-        shown.append((title, functools.partial(_one, content=content, plot={group: curves})))
+        shown.append((title, lambda axes, plot={group: curves}: _series([axes], content, plot, 1)))  # type: ignore[misc]
     if spread := speeds.of_frames(content):
-        shown.append(("speeds", functools.partial(speeds.draw, content=content, spread=spread)))
+        shown.append(("speeds", lambda axes: speeds.draw(axes, content, spread)))
     return shown
-
-
-def _one(axes: Any, content: Content, plot: dict[str, graphs.Curves]) -> None:
-    _series([axes], content, plot, 1)
 
 
 def picture_of_places(

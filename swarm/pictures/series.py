@@ -11,7 +11,6 @@ from ..bodies.body import Body
 from ..methods import Method
 from ..scene import Scene
 from ..state import Floats
-from ..surfaces.surface import Surface
 from ..surfaces.union import part_at
 from ..triangles.shape import Shape
 from ..words.named import name_of
@@ -155,12 +154,6 @@ def lines_of(
         lines.append(Line("/link_error", "of a link", "link_error", logarithm=True))
     if body is not None and any(motion is not None for motion in body.anchors.values()):
         lines.append(Line("/energy/work", "work of anchors", "work"))
-    # The walls of an open volume are drawn in part, so they have no area.
-    group = "force" if scene.is_open() else "pressure"
-    for wall in _walls(scene, shapes):
-        if scene.is_open() or wall.area > 0.0:
-            per = 1.0 if scene.is_open() else wall.area
-            lines.append(Line(f"/{group}/{wall.name}", wall.label, wall.observed("impulse"), wall.number, per=per))
     if method.is_rigid():
         lines.append(Line("/sliding", every, "sliding"))
     if isinstance(more, Mapping):
@@ -206,40 +199,20 @@ def _pairs_lose(scene: Scene) -> bool:
     return scene.pairs is not None and (scene.pairs.restitution < 1.0 or scene.pairs.friction > 0.0)
 
 
-@dataclass(frozen=True)
-class _Wall:
-    """A surface, or a part of one, and its number among those of the observables of either."""
-
-    name: str
-    label: str
-    surface: Surface
-    number: int
-    area: float
-    is_part: bool
-
-    def observed(self, quantity: str) -> str:
-        """The observable that holds a quantity of it."""
-        return f"part_{quantity}" if self.is_part else {"impulse": "impulse"}.get(quantity, f"wall_{quantity}")
-
-
-def _walls(scene: Scene, shapes: list[Shape]) -> list[_Wall]:
-    """What is drawn, by its surfaces, and by the parts of those that have parts."""
-    found, names = [], labels(scene)
-    for shape in shapes:
-        i, part = shape.surface, (shape.surface, shape.place)
-        number = scene.parts.index(part) if shape.place else i
-        surface = part_at(scene.surfaces[i], shape.place)
-        found.append(_Wall(shape.name, names[part], surface, number, shape.area(), bool(shape.place)))
-    return found
-
-
 def _lines_of_walls(scene: Scene, shapes: list[Shape]) -> list[Line]:
-    """Of surfaces that give heat, do work, or are moved."""
+    """What surfaces, or the parts of those that have parts, take and give: impulse, heat, work."""
     lines, names = [], labels(scene)
-    for wall in _walls(scene, shapes):
-        surface = wall.surface
+    # The walls of an open volume are drawn in part, so they have no area.
+    group = "force" if scene.is_open() else "pressure"
+    for shape in shapes:
+        key = shape.surface, shape.place
+        number, of = (scene.parts.index(key), "part") if shape.place else (shape.surface, "wall")
+        surface, area = part_at(scene.surfaces[shape.surface], shape.place), shape.area()
+        if scene.is_open() or area > 0.0:
+            pushed, per = "part_impulse" if shape.place else "impulse", 1.0 if scene.is_open() else area
+            lines.append(Line(f"/{group}/{shape.name}", names[key], pushed, number, per=per))
         if surface.temperature is not None or surface.laws:
-            lines.append(Line(f"/heat/{wall.name}", wall.label, wall.observed("heat"), wall.number, per=1.0))
+            lines.append(Line(f"/heat/{shape.name}", names[key], f"{of}_heat", number, per=1.0))
     for i, surface in enumerate(scene.surfaces):
         name = name_of(scene, i)
         if surface.reacts():

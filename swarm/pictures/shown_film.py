@@ -8,7 +8,6 @@ from typing import Any
 
 from ..errors import SceneError
 from ..files import marks, paths
-from ..files.replaced import replaced
 from . import film
 
 # Notebooks with more base64 than this hang when they are opened, saved or scrolled.
@@ -67,10 +66,7 @@ class Film:
                 f"save: this film is {'a' if self.suffix == '.gif' else 'an'} {self.suffix}, expected a file name "
                 f"that ends so, got {path}; trajectory.animate writes the other kind"
             )
-        marks.check_target(target, overwrite, "film")
-        with replaced(target, "film") as file:
-            file.write(self.content)
-        return target
+        return marks.write(target, self.content, "film", overwrite)
 
     def _megabytes(self) -> str:
         return f"{len(self.content) / 1e6:.2g} MB"

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtr
 
 from ..state import Floats
 from ..words.amounts import amount, prefixed
@@ -53,17 +54,15 @@ def of_all(content: Any) -> float | None:
     return float(values.mean()) if len(values) > 1 and are_alike(values) else None
 
 
-def maxwell(speeds: Floats, mean_square: float, dimensions: int) -> Floats:
-    """The density of Maxwell's law at speeds, of particles of one mass with this mean square of theirs.
+def below(speeds: Floats, mean_square: float, dimensions: int) -> Floats:
+    """The part of particles of one mass, with this mean square of speeds, that is below speeds by Maxwell's law.
 
-    >>> at = np.linspace(0.0, 10.0, 2001)
-    >>> np.round([maxwell(at, 2.0, d).sum() * at[1] for d in (2, 3)], 4).tolist()
-    [1.0, 1.0]
+    Squares of speeds over the mean square of a component have a chi-square distribution.
+
+    >>> [below(np.array(1.0), d, d).round(4).item() for d in (2, 3)]  # 1 - exp(-1/2), and erf(1/sqrt(2)) less a term
+    [0.3935, 0.1987]
     """
-    variance = mean_square / dimensions
-    if dimensions == 2:
-        return np.asarray(speeds / variance * np.exp(-(speeds**2) / (2.0 * variance)))
-    return np.asarray(np.sqrt(2.0 / np.pi) * speeds**2 / variance**1.5 * np.exp(-(speeds**2) / (2.0 * variance)))
+    return np.asarray(chdtr(dimensions, dimensions * np.maximum(speeds, 0.0) ** 2 / mean_square))
 
 
 def draw(axes: Any, content: Any, spread: Spread) -> None:
@@ -97,12 +96,11 @@ def _law(axes: Any, content: Any, spread: Spread, bin_width: float, factor: floa
     if content.body is not None or np.ptp(masses) > 1e-9 * masses.max() or are_alike(values) or len(values) < _BINS:
         return
     dimensions = 3 if content.scene.plane is None else 2
-    at = np.linspace(0.0, _top(spread), 400)
-    density = maxwell(at, float((values**2).mean()), dimensions)
-    law = np.cumsum(density) * at[1]
+    at, half = np.linspace(0.0, _top(spread), 400), 0.5 * bin_width
+    law, low, high = (below(at + more, float((values**2).mean()), dimensions) for more in (0.0, -half, half))
     measured = np.searchsorted(np.sort(values), at) / len(values)
     if np.abs(law - measured).max() < _NEAR:
-        axes.plot(at * factor, 100.0 * density * bin_width, color=style.RED, linewidth=1.2, linestyle=":",
+        axes.plot(at * factor, 100.0 * (high - low), color=style.RED, linewidth=1.2, linestyle=":",
                   label="Maxwell, same energy")  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from typing import Any
 from matplotlib.text import OffsetFrom
 from matplotlib.transforms import ScaledTranslation
 
+from ..words.amounts import amount
 from .eye import Eye
 
 INK = "#5a5a62"
@@ -15,22 +16,12 @@ STRIP, _ARROW, _CORNER, _LETTERS = 42.0, 19.0, 15.0, 8.0
 BAR = 0.28
 # Arrows that are seen shorter than this part are not drawn.
 _SHORT = 0.15
-# The exponents of ten of units, from the largest: a length has the first one that is not above it.
-_UNITS = ((3, "km"), (0, "m"), (-2, "cm"), (-3, "mm"), (-6, "µm"), (-9, "nm"))
 
 
 def round_length(most: float) -> float:
     """The largest of 1, 2, 5 times a power of ten that is not above a length."""
     power = 10.0 ** math.floor(math.log10(most))
     return next((k * power for k in (5.0, 2.0) if k * power <= most), power)
-
-
-def length_in_words(length: float) -> str:
-    """A length [m] with the unit in which it is a short number."""
-    for exponent, unit in _UNITS:
-        if length >= 10.0**exponent * (1.0 - 1e-9):
-            return f"{length / 10.0**exponent:.4g} {unit}"
-    return f"{length:.4g} m"
 
 
 def draw_triad(axes: Any, eye: Eye, most: float) -> None:
@@ -53,7 +44,7 @@ def draw_triad(axes: Any, eye: Eye, most: float) -> None:
     axes.plot([right - length, right], [0.0, 0.0], transform=bar, color=INK, linewidth=2.0, solid_capstyle="butt",
               clip_on=False)  # fmt: skip
     above = bar + ScaledTranslation(0.0, 3.0 / 72.0, scale)
-    axes.text(right - 0.5 * length, 0.0, length_in_words(length), fontsize=_LETTERS, color=INK, ha="center",
+    axes.text(right - 0.5 * length, 0.0, amount(length, "m"), fontsize=_LETTERS, color=INK, ha="center",
               va="bottom", transform=above, clip_on=False)  # fmt: skip
 
 

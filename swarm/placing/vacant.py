@@ -68,13 +68,10 @@ class Vacant:
         points[self._axes] = self._low[self._axes] + within * self._width[self._axes, None]
         return points
 
-    def _reach(self) -> float:
-        """From the middle of a box to its corners [m]."""
-        return 0.5 * math.sqrt(float((self._width[self._axes] ** 2).sum()))
-
     def _left(self, boxes: NDArray[np.int64]) -> NDArray[np.int64]:
         """Those of the boxes in which there may be a place."""
-        reach, n = self._reach(), boxes.shape[1]
+        # From the middle of a box to its corners [m].
+        reach, n = 0.5 * math.sqrt(float((self._width[self._axes] ** 2).sum())), boxes.shape[1]
         if not n or reach >= self.radius:
             return boxes
         middles = np.zeros((3, n))

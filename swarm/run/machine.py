@@ -6,7 +6,7 @@ import logging
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from ..kernel.cache import kernels_compiled
 from ..kernel.compiling import Compilations
 from ..particles import ARRAYS, Particles
 from ..scene import Scene
-from ..state import Absorbed, Multipliers
+from ..state import Floats
 from . import failures
 from .base import BaseRun
 from .engines import run_of
@@ -29,6 +29,7 @@ from .options import Task
 from .outputs import recorder_of, writer_of
 from .preflight import hints
 from .progress import LOOK, Display, Standstill, display
+from .result import Result
 from .session import Session
 from .tally import Watched, tally_of
 
@@ -38,21 +39,6 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger("swarm")
 # The frames after which observables are packed into arrays: as Python objects they take 3 kB a frame.
 _PACKED = 1024
-
-
-class RunEnd(NamedTuple):
-    """The end of a run; `Result` describes each field."""
-
-    particles: Particles
-    observables: dict[str, NDArray[Any]]
-    wall_time: float
-    multipliers: Multipliers | None
-    impacts: NDArray[np.int64]
-    escape_time: NDArray[np.float64]
-    absorbed: Absorbed | None
-    birth_time: NDArray[np.float64]
-    collisions: NDArray[np.int64] | None = None
-    compile_time: float = 0.0
 
 
 class Columns:
@@ -80,7 +66,7 @@ class Columns:
         return {name: np.concatenate([part[name] for part in self._packed]) for name in names}
 
 
-def carry_out_task(task: Task, session: Session) -> RunEnd:
+def carry_out_task(task: Task, session: Session) -> Result:
     """Carry out a checked run, frame by frame."""
     if task.scene.is_open() and not task.scene.is_open_upwards_only() and not task.is_shard:
         warn_open()
@@ -115,7 +101,7 @@ def carry_out_task(task: Task, session: Session) -> RunEnd:
                 if log is not None:
                     log.ends[number] = log.total
                 write(number, moment, run.state, seen)
-                shown = _snapshot_of(task, read, moment, True) if callable(task.options.progress) else NOTHING
+                shown = _snapshot_of(task, read, moment) if callable(task.options.progress) else NOTHING
                 show.frame(Frame(number, moment, until, Observables(seen), writer.written if writer else 0, shown))
                 shown.end()
                 if moment < until:
@@ -185,36 +171,40 @@ def start_of(task: Task) -> Snapshot:
     return _snapshot_of(task, arrays.get, 0.0)
 
 
-def _snapshot_of(task: Task, read: Read, moment: float, copies: bool = False) -> Snapshot:
+def _snapshot_of(task: Task, read: Read, moment: float) -> Snapshot:
     """Return the particles of a run in the scene at a moment [s]."""
     scene, births = task.scene, task.particles.births
     born = read("born_time")
     there: Any = None if births is None else births.there(moment)
     there = there if born is None else ~np.isnan(born)
-    return Snapshot(read, scene.gravity, scene.period, there, copies)
+    return Snapshot(read, scene.gravity, scene.period, there)
 
 
-def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> RunEnd:
-    state = run.state
-    born = birth_times(task.particles) if state.born_time is None else state.born_time
+def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> Result:
+    state, particles = run.state, task.particles
+    born = birth_times(particles) if state.born_time is None else state.born_time
     # Balls that were not born have no place.
-    task.particles.position[:, np.isnan(born)] = task.particles.velocity[:, np.isnan(born)] = np.nan
-    is_whole = session.first == 0 or task.is_shard
-    return RunEnd(
-        task.particles,
-        kept.arrays() if is_whole else read_back(task.options.trajectory),
+    particles.position[:, np.isnan(born)] = particles.velocity[:, np.isnan(born)] = np.nan
+    is_whole, never = session.first == 0 or task.is_shard, np.full(len(particles), np.nan)
+    return Result(
+        particles,
+        Observables(kept.arrays() if is_whole else read_back(task.options.trajectory)),
         session.wall_time(),
+        task.options.trajectory,
         state.multipliers,
         state.impacts,
-        np.full(len(task.particles), np.nan) if state.escape_time is None else state.escape_time,
-        state.absorbed,
+        never if state.escape_time is None else state.escape_time,
+        never.copy() if state.absorbed_time is None else state.absorbed_time,
+        None if task.bodies is None else task.bodies.moved(particles),  # type: ignore[arg-type]
+        task.scene,
+        task.method,
         born,
         state.collisions,
         session.compiled.seconds,
     )
 
 
-def birth_times(particles: Particles) -> NDArray[np.float64]:
+def birth_times(particles: Particles) -> Floats:
     """Return the birth time of each particle [s], 0 for particles of the start."""
     return np.zeros(len(particles)) if particles.births is None else particles.births.time
 

@@ -106,22 +106,13 @@ class Measures:
                 ) from error
             try:
                 value = _numbers(given)
-                self._require_shape(name, value)
+                if value.shape != (before := self._shapes.setdefault(name, value.shape)):
+                    raise ValueError(f"the same shape at every frame, {before} as at those before, got {value.shape}")
             except ValueError as error:
                 raise failure(f"observables[{name!r}] must return {error}, at frame {number}, {time:g} s") from None
-            del given
-            if held := arrays.let_go():
-                raise failure(
-                    f"observables[{name!r}] must keep no array of a frame, which the next one changes; it has kept "
-                    f"{' and '.join(held)} of frame {number}: keep a copy, frame.{held[0]}.copy()"
-                )
             seen[name] = value if value.ndim else value.item()
+        arrays.end()
         return seen
-
-    def _require_shape(self, name: str, value: NDArray[np.float64]) -> None:
-        before = self._shapes.setdefault(name, value.shape)
-        if value.shape != before:
-            raise ValueError(f"the same shape at every frame, {before} as at those before, got {value.shape}")
 
 
 # The measures of a run without user-defined observables.

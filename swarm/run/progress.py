@@ -52,7 +52,7 @@ def display(progress: "bool | Callable[[Any], None] | Display") -> Iterator[Disp
         yield Display(_nothing)
     else:
         with progress_listener() as one:
-            yield _of_run(one, _A_MOMENT if sys.stderr.isatty() else _A_MINUTE)
+            yield display_by(one, _A_MOMENT if sys.stderr.isatty() else _A_MINUTE)
 
 
 class ProgressListener(NamedTuple):
@@ -101,12 +101,7 @@ def in_lines(interval: float) -> ProgressListener:
     return ProgressListener(put, lambda sentence: print(sentence, file=sys.stderr, flush=True))
 
 
-def lines(interval: float) -> Display:
-    """Return the display of a run that prints a line when the last one is `interval` seconds old."""
-    return _of_run(in_lines(interval), interval)
-
-
-def _of_run(one: ProgressListener, every: float) -> Display:
+def display_by(one: ProgressListener, every: float) -> Display:
     """Return the display of a run with the share done and a line about the last seconds."""
     recent = _Recent()
 

@@ -4,8 +4,6 @@ import functools
 from collections.abc import Sequence
 from typing import Any, overload
 
-import numpy as np
-
 from ..common.catalog import Observables
 from ..common.checks import shown
 from ..common.frames import Frame
@@ -32,7 +30,7 @@ class Frames(Sequence[Frame]):
         self._trajectory = trajectory
         scene, self._seen = trajectory.scene, trajectory.observables
         self._gravity, self._period = scene.gravity, scene.period
-        self._born = trajectory.birth_time if trajectory.has_particles() and trajectory.has_births() else None
+        self._feeds = trajectory.has_particles() and trajectory.has_births()
 
     def __len__(self) -> int:
         return len(self._seen["time"])
@@ -55,12 +53,9 @@ class Frames(Sequence[Frame]):
     def _frame(self, k: int) -> Frame:
         seen = {name: values[k] if values.ndim > 1 else values[k].item() for name, values in self._seen.items()}
         until = float(self._seen["time"][-1])
-        born = self._born
-        there: Any = None if born is None else int(np.searchsorted(born, seen["time"], side="right"))
-        if born is not None and self._trajectory.radius is not None:
-            there = self._trajectory.born(k)
+        there = self._trajectory.born(k) if self._feeds else None
         read = functools.partial(values_of, self._trajectory, k)
-        arrays = Snapshot(read, self._gravity, self._period, there, copies=True)
+        arrays = Snapshot(read, self._gravity, self._period, there)
         return Frame(k, seen["time"], until, Observables(seen), len(self), arrays)
 
 

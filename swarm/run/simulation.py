@@ -4,9 +4,6 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from ..common.catalog import Observables
 from ..common.frames import Frame
 from ..methods.base import Method
 from ..methods.impact import Impact
@@ -16,7 +13,7 @@ from ..sources.source import Source
 from ..surfaces.counter import Counter
 from ..surfaces.surface import Surface
 from . import engines, machine
-from .options import RunOptions, Task
+from .options import RunOptions
 from .preflight.admission import task_of
 from .result import Result
 from .session import Session
@@ -164,19 +161,10 @@ def carry_out(
     counted_from: float | None = None,
 ) -> Result:
     """Carry out `simulate` with `RunOptions`; the wall time counts from `counted_from` [s], or from now."""
-    carried: Callable[[Task, Any], machine.RunEnd] = machine.carry_out_task
-    session: Session
     if options.cluster is None:
         session = Session(options, counted_from)
-    else:
-        cluster = engines.wing("fleet.sharded_run")  # `distributed` takes half a second to import
-        session, carried = cluster.Sharded(options, counted_from), cluster.carry_out
-    task = task_of(scene, particles, method, options)
-    end = carried(task, session)
-    bodies: Any = None if task.bodies is None else task.bodies.moved(end.particles)
-    absorbed_time = np.full(len(end.particles), np.nan) if end.absorbed is None else end.absorbed.time
-    return Result(
-        end.particles, Observables(end.observables), end.wall_time, options.trajectory, end.multipliers, end.impacts,
-        end.escape_time, absorbed_time, bodies, scene, method, end.birth_time,
-        end.collisions, end.compile_time,
-    )  # fmt: skip
+        return machine.carry_out_task(task_of(scene, particles, method, options), session)
+    cluster = engines.wing("fleet.sharded_run")  # `distributed` takes half a second to import
+    sharded = cluster.Sharded(options, counted_from)
+    result: Result = cluster.carry_out(task_of(scene, particles, method, options), sharded)
+    return result

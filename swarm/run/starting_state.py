@@ -55,7 +55,7 @@ def state_of(
         np.zeros(n, np.int64),
         np.zeros((booked, n)),
         np.zeros(n if loses else 0),
-        _no_sweeps(n) if method.has_multipliers() else None,
+        Multipliers(*np.zeros((3, n), np.int64), *np.zeros((2, n))) if method.has_multipliers() else None,
         _no_contacts(rows, n) if method.may_slide() else None,
         None if laws is None or not laws.give_heat else np.zeros((rows, n)),
         particles.image,
@@ -129,8 +129,3 @@ def _no_contacts(walls: int, n: int) -> Contacts:
     phase, load = np.zeros(n, np.int8), np.zeros((walls, n))
     met, step, keep, remaining, short_steps, sliding = np.zeros((6, n))
     return Contacts(phase, np.zeros((2, n)), met, step, keep, remaining, np.zeros((2, n)), short_steps, load, sliding)
-
-
-def _no_sweeps(n: int) -> Multipliers:
-    counts = np.zeros((3, n), np.int64)
-    return Multipliers(counts[0], counts[1], counts[2], np.zeros(n), np.zeros(n))

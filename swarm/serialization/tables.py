@@ -47,13 +47,18 @@ _ELSEWHERE = {
 _LONG, _ARRAY = 1000, "sha256:"
 
 
-def files_in(document: Any) -> Iterator[str]:
-    """The names of the files of a document, which are a part of what it describes."""
+def texts_in(document: Any) -> Iterator[tuple[str, str]]:
+    """The texts of a document, and of all its tables and lists, each with its key or its place."""
     for key, value in document.items() if isinstance(document, dict) else enumerate(document):
         if isinstance(value, (dict, list)):
-            yield from files_in(value)
-        elif key in FILES and isinstance(value, str):
-            yield value
+            yield from texts_in(value)
+        elif isinstance(value, str):
+            yield str(key), value
+
+
+def files_in(document: Any) -> Iterator[str]:
+    """The names of the files of a document, which are a part of what it describes."""
+    return (text for key, text in texts_in(document) if key in FILES)
 
 
 def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None, pairs: Any = None) -> Scene:
@@ -129,16 +134,18 @@ def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) 
     """
     if own := getattr(described, "table", None):  # of an OwnSurface
         return _with_nested(own(), described, arrays)
-    given = {
-        field.metadata.get("key", field.name): getattr(described, field.name)
-        for field in kept_fields(type(described))
-        if not is_left_out(described, field)
-    }
-    table = {key: value for key, value in given.items() if value is not None}
-    table = {key: _written(value, arrays) if isinstance(value, np.ndarray) else value for key, value in table.items()}
+    given = _given(described).items()
+    table = {key: _written(value, arrays) if isinstance(value, np.ndarray) else value for key, value in given}
     mine = type(described)
     kind = ALL_SURFACES.kind_of(mine) or ALL_METHODS.kind_of(mine) or f"{mine.__module__}:{mine.__qualname__}"
     return _with_nested({"kind": kind, **table}, described, arrays)
+
+
+def _given(described: Any) -> dict[str, Any]:
+    """The fields of a dataclass that a file has, by their keys; TOML has no None."""
+    fields = [field for field in kept_fields(type(described)) if not is_left_out(described, field)]
+    given = {field.metadata.get("key", field.name): getattr(described, field.name) for field in fields}
+    return {key: value for key, value in given.items() if value is not None}
 
 
 def _with_nested(table: dict[str, Any], described: Surface | Method, arrays: dict[str, Any] | None) -> dict[str, Any]:
@@ -194,16 +201,10 @@ def with_arrays(table: dict[str, Any], arrays: Mapping[str, Any]) -> dict[str, A
 def scene_table(scene: Scene, arrays: dict[str, Any] | None = None) -> dict[str, Any]:
     """The tables of a scene; `arrays` as of `table_of`."""
     gravity = {} if scene.gravity is None else {"gravity": scene.gravity}
-    # TOML has no None.
     period = {} if scene.period is None else {"period": [length or False for length in scene.period]}
     plane = {} if scene.plane is None else {"plane": scene.plane}
-    pairs = {} if scene.pairs is None else {"pairs": _table_of_pairs(scene.pairs)}
+    pairs = {} if scene.pairs is None else {"pairs": _given(scene.pairs)}
     return {**gravity, **period, **plane, **pairs, "surface": [table_of(surface, arrays) for surface in scene.surfaces]}
-
-
-def _table_of_pairs(pairs: Pairs) -> dict[str, Any]:
-    given = {one.name: getattr(pairs, one.name) for one in dataclasses.fields(pairs) if not is_left_out(pairs, one)}
-    return {key: value for key, value in given.items() if value is not None}
 
 
 def kept_fields(cls: type[Any]) -> list[dataclasses.Field[Any]]:

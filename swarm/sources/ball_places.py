@@ -9,8 +9,7 @@ from ..errors import SceneError
 from ..particles import Particles
 from ..scene import Scene
 from ..state import Floats
-from ..surfaces.area_samples import Random
-from .births import PLACES, VELOCITIES, from_surface, from_volume, require_beam, require_in_plane, stream
+from .births import PLACES, VELOCITIES, require_in_plane, stream, velocities_at
 from .places import PointBatches, changes, place_of
 from .source import Source
 
@@ -91,10 +90,8 @@ class BallPlaces:
             )
         self.found = count
         points, normals = np.resize(np.concatenate(found, axis=1).T, (_BLOCK, 6)).T.reshape(2, 3, _BLOCK)
-        velocity = self._velocities(speeds, points, normals)
-        if self._across is not None:
-            points[self._across] = velocity[self._across] = 0.0
-        return points, velocity
+        source = replace(self._source, mass=1.0, density=None)
+        return points, velocities_at(self._place, source, self._name, speeds, (points, normals), self._across)
 
     def _fits(self, points: Floats) -> Floats:
         """Whether the largest ball is within all walls that are at rest."""
@@ -102,13 +99,6 @@ class BallPlaces:
             return np.ones(points.shape[1], np.bool_)
         radius = np.full(points.shape[1], self.radius)
         return np.asarray((self._scene.distances_outside(points, 0.0, radius)[self._lasting] <= 0.0).all(axis=0))
-
-    def _velocities(self, random: Random, points: Floats, normals: Floats) -> Floats:
-        source = replace(self._source, mass=1.0, density=None)
-        if self._place.volume:
-            return from_volume(source, random, _BLOCK, self._across)
-        require_beam(source, self._name, points, normals)
-        return from_surface(source, random, normals, self._across)
 
 
 def ball_places(scene: Scene, particles: Particles, seed: int, sized: str = "radius") -> list[BallPlaces]:

@@ -17,7 +17,7 @@ from ..state import Floats
 from ..surfaces.area_samples import Random
 from ..surfaces.instant import distances, side_of
 from ..surfaces.plane import along
-from .places import PointBatches, changes, place_of
+from .places import PointBatches, SourcePlace, changes, place_of
 from .source import Source
 
 # Streams of a source.
@@ -192,14 +192,7 @@ def _drawn(
     # A source without births is looked at too.
     position, normals = points.draw(stream(seed, k, PLACES), max(1, len(times)))
     position, normals = position[:, : len(times)], normals[:, : len(times)]
-    random = stream(seed, k, VELOCITIES)
-    if place.volume:
-        velocity = from_volume(source, random, len(times), across)
-    else:
-        require_beam(source, name, position, normals)
-        velocity = from_surface(source, random, normals, across)
-    if across is not None:
-        position[across] = velocity[across] = 0.0
+    velocity = velocities_at(place, source, name, stream(seed, k, VELOCITIES), (position, normals), across)
     _require_free(scene, name, times, position)
     return times, position, velocity
 
@@ -214,7 +207,7 @@ def require_in_plane(scene: Scene, source: Source, name: str) -> None:
         )
 
 
-def require_beam(source: Source, name: str, position: Floats, normals: Floats) -> None:
+def _require_beam(source: Source, name: str, position: Floats, normals: Floats) -> None:
     """Raise a `SceneError` for a beam that leads out of the vessel from a surface with these normals."""
     if source.beam is None:
         return
@@ -294,7 +287,22 @@ def _outside_then(scene: Scene, i: int, times: Floats, position: Floats) -> Floa
     return depths
 
 
-def from_volume(source: Source, random: Random, n: int, across: int | None) -> Floats:
+def velocities_at(
+    place: SourcePlace, source: Source, name: str, random: Random, points: tuple[Floats, Floats], across: int | None
+) -> Floats:
+    """Velocities (3, n) of births at points of a place, given with the normals there; both are put into the plane."""
+    position, normals = points
+    if place.volume:
+        velocity = _from_volume(source, random, position.shape[1], across)
+    else:
+        _require_beam(source, name, position, normals)
+        velocity = _from_surface(source, random, normals, across)
+    if across is not None:
+        position[across] = velocity[across] = 0.0
+    return velocity
+
+
+def _from_volume(source: Source, random: Random, n: int, across: int | None) -> Floats:
     """Velocities (3, n) of particles that are born in a volume."""
     if source.beam is not None:
         return _beam(source, random, n, across)
@@ -306,7 +314,7 @@ def from_volume(source: Source, random: Random, n: int, across: int | None) -> F
     return np.asarray((source.speed or 0.0) * normal / np.sqrt((normal**2).sum(axis=0)))
 
 
-def from_surface(source: Source, random: Random, normals: Floats, across: int | None) -> Floats:
+def _from_surface(source: Source, random: Random, normals: Floats, across: int | None) -> Floats:
     """Velocities (3, n) of particles that come from a surface, against these unit normals."""
     n = normals.shape[1]
     if source.beam is not None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .data.sampled import Sampled
     from .facets.mesh import Mesh
     from .fields.bodies import Boxes, Capsules, Cylinders, Ellipsoids, Spheres
-    from .fields.many import Many
+    from .fields.many import ManyBodies
     from .formulas.formula import Formula
     from .formulas.own import OwnSurface
     from .outlines.polygon import Polygon, Prism, Stadium
@@ -40,7 +40,7 @@ __all__ = [
 ]  # fmt: skip
 
 # Many bodies of one kind.
-ALL_FIELDS: Kinds["Many"] = Kinds(
+ALL_FIELDS: Kinds["ManyBodies"] = Kinds(
     __name__,
     {
         "spheres": "fields.bodies:Spheres",

@@ -1,8 +1,8 @@
 """Points of surfaces, uniform in their area, or in their length in a plane.
 
-A surface gives what points can be drawn from exactly. From spheres, tori, triangles and outlines they are drawn as they
-are. Any other wall is a quadric or a plane: lines that are uniform and isotropic in a ball, or in a plane in a disc,
-meet every piece of an area equally often (Crofton), however it is turned.
+Each surface says how its points are drawn exactly. Those of spheres, tori, triangles and outlines are drawn directly.
+Any other wall is a quadric or a plane: lines that are uniform and isotropic in a ball, or in a plane in a disc, meet
+every piece of an area equally often (Crofton), however it is turned.
 """
 
 import functools
@@ -22,7 +22,7 @@ Region = tuple[Floats, Floats]
 Draw = Callable[[Random, int], Floats]
 
 
-# A point that is drawn is as near to its surface, of its extent.
+# A point that is drawn is as near to its surface as this part of the extent of the surface.
 NEAR = 1e-10
 
 
@@ -30,8 +30,8 @@ class AreaSample(NamedTuple):
     """A part of a surface.
 
     Attributes:
-        area: of what points are drawn from, so that those of samples drawn in proportion to it are uniform in all.
-        draw: so many points (3, n), NaN where a line meets nothing.
+        area: of what is sampled. Points of several samples are uniform in all if they are as many as their areas say.
+        draw: a function that draws so many points (3, n), NaN where a line meets nothing.
     """
 
     area: float
@@ -39,7 +39,7 @@ class AreaSample(NamedTuple):
 
 
 def points_of(samples: list[AreaSample], random: Random, n: int) -> Floats:
-    """So many points at most of samples, uniform in their areas, in random order."""
+    """At most so many points of some samples, uniform in their areas, in random order."""
     areas = np.array([one.area for one in samples])
     counts = random.multinomial(n, areas / areas.sum()) if len(samples) > 1 else np.array([n])
     drawn = [one.draw(random, int(count)) for one, count in zip(samples, counts, strict=True) if count]
@@ -56,7 +56,7 @@ def directions(random: Random, n: int) -> Floats:
 
 
 def of_triangles(vertices: Floats, triangles: NDArray[Any]) -> AreaSample:
-    """What points of triangles (T, 3) with these corners (V, 3) are drawn from."""
+    """The sample of triangles (T, 3) with these corners (V, 3)."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     areas = 0.5 * np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1))
 
@@ -74,7 +74,7 @@ def of_triangles(vertices: Floats, triangles: NDArray[Any]) -> AreaSample:
 
 
 def by_lines(surface: Any, bounds: Region, across: int | None) -> Iterator[AreaSample]:
-    """What points of any surface with walls of the second degree at most are drawn from."""
+    """The samples of a surface with walls of the second degree at most."""
     low, high = (np.array(corner, np.float64) for corner in surface.enclosing_box())
     low, high = np.maximum(low, bounds[0]), np.minimum(high, bounds[1])
     if not np.isfinite(high - low).all():
@@ -97,7 +97,7 @@ def by_lines(surface: Any, bounds: Region, across: int | None) -> Iterator[AreaS
 
 
 def _met(wall: Any, ball: tuple[Floats, float, int | None], random: Random, n: int) -> Floats:
-    """Where random lines through a ball, or a disc, meet a wall; of two places one of both, as a coin says."""
+    """Where random lines through a ball, or a disc, meet a wall; of two places on a line one at random."""
     center, radius, across = ball
     first, u = _lines(random, n, across)
     foot = center + radius * first

@@ -7,11 +7,12 @@ from ..kernel.gravity import as_vector
 from ..kernel.jit import select
 from ..kernel.record import Record
 from ..kernel.vector import absolute, dot, square, total
-from .depth import penetration
 from .frames import Framed
 from .presence.openings import is_in_any
 from .shapes.plane import PlaneNumbers
 from .time_of_impact import flights
+from .time_of_impact.polynomial import bernstein
+from .walls import penetration
 
 
 class Counted(Record):
@@ -132,24 +133,17 @@ def _may_meet(ball, gravity, r, v, span):
 
 
 def _may_rise(level, span):
-    """Whether the level of a fall may be above 0 within a time: by Bernstein's coefficients of its parts."""
-    b, a2, a3, a4 = span * level.b, span * span * level.a2, span * span * span * level.a3, level.a4
-    a4 = (span * span) * (span * span) * a4
-    c = level.c
-    whole = (c, c + 0.5 * b, c + b + a2 / 6.0, c + 1.5 * b + 0.5 * a2 + 0.25 * a3, c + 2.0 * b + a2 + a3 + a4)
-    return _are_some_above(whole)
+    """Whether the level of a fall may be above 0 within a time."""
+    return _are_some_above(bernstein((level.c, 2.0 * level.b, level.a2, level.a3, level.a4), span))
 
 
 def _may_rise_again(level, span):
     """The same of a flight from the level 0 inwards, by what is left of the level over the time."""
-    third, a3, a4 = span * level.a2 / 3.0, span * span * level.a3, span * span * span * level.a4
-    b = 2.0 * level.b
-    whole = (b, b + third, b + 2.0 * third + a3 / 3.0, b + 3.0 * third + a3 + a4)
-    return _are_some_above(whole)
+    return _are_some_above(bernstein((2.0 * level.b, level.a2, level.a3, level.a4), span))
 
 
 def _are_some_above(whole):
-    """Whether any coefficient of a quarter of an interval is not below 0, from those of the whole one."""
+    """Whether any Bernstein coefficient of a quarter of an interval is not below 0, from those of the whole one."""
     found = False
     for half in _halves(whole):
         for quarter in _halves(half):

@@ -1,13 +1,38 @@
-"""How a surface without a Hessian bends, by central differences of its gradient or of its normal."""
+"""Matrices of second derivatives, and how a surface without a Hessian bends, by central differences."""
 
 import math
 
 from ..kernel.jit import select
+from ..kernel.limits import TINY
 from ..kernel.vector import Symmetric, Vec, dot, square
+from ..state import Floats
 
 # The part of a length for a difference, the cube root of round-off: the error of the difference and that of its
 # terms are alike.
 SPACING = 6e-6
+# Of the entries of a `Symmetric`, those that are the rows of the matrix.
+_ROWS = [0, 3, 5, 3, 1, 4, 5, 4, 2]
+
+
+def matrices_of(entries: Floats) -> Floats:
+    """The symmetric matrices (n, 3, 3) with these entries (6, n), in the order of `Symmetric`."""
+    return entries[_ROWS].T.reshape(-1, 3, 3)
+
+
+def inverse(a):
+    """The inverse of a symmetric matrix."""
+    x, y, z = a.yy * a.zz - a.yz * a.yz, a.xx * a.zz - a.zx * a.zx, a.xx * a.yy - a.xy * a.xy
+    xy, yz, zx = a.yz * a.zx - a.xy * a.zz, a.xy * a.zx - a.yz * a.xx, a.xy * a.yz - a.zx * a.yy
+    whole = a.xx * x + a.xy * xy + a.zx * zx
+    f = 1.0 / select(abs(whole) > TINY, whole, 1.0)
+    return Symmetric(f * x, f * y, f * z, f * xy, f * yz, f * zx)
+
+
+def applied(a, v):
+    """A symmetric matrix times a vector."""
+    return Vec(
+        a.xx * v.x + a.xy * v.y + a.zx * v.z, a.xy * v.x + a.yy * v.y + a.yz * v.z, a.zx * v.x + a.yz * v.y + a.zz * v.z
+    )
 
 
 def half_hessian(wall, r, h, sign=1.0):

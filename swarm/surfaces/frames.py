@@ -10,62 +10,42 @@ from typing import Any
 
 from .contract import Smooth
 
-# What is asked: the roles of its arguments, and of the answer.
-_FORWARDED: tuple[tuple[str, tuple[str | None, ...], str | None], ...] = (
-    ("gap_of", (None,), None),
-    ("level_of", (None,), None),
-    ("gap_slope", (None, None), None),
-    ("phi", ("place",), None),
-    ("polynomial", ("place",), None),
-    ("inner", ("place",), None),
-    ("distance", ("place",), None),
-    ("gap_scale", ("place",), None),
-    ("gradient", ("place",), "vector"),
-    ("inner_gradient", ("place",), "vector"),
-    ("unit_normal", ("place",), "vector"),
-    ("project", ("place",), "place"),
-    ("out_of", ("place",), None),
-    ("far", ("place",), None),
-    ("reach", ("lease",), None),
-    ("farthest_push", (), None),
-    ("first_hit", ("place", "velocity"), None),
-    ("falling_hit", ("place", "velocity", "vector"), None),
-    ("safe_time", ("place", "velocity", "vector"), None),
-    ("course", ("place", "velocity", "vector"), None),
-    ("level_along", ("seen",), None),
-    ("moving_step", ("seen", None), None),
-    ("passage", ("place", "velocity", "swings"), None),
-    ("outward_acceleration", ("place", "velocity", "vector"), None),
-    ("steps", ("gravity", "place", "velocity"), None),
-    ("fall", ("gravity", "place", "velocity"), None),
-    ("refined", ("gravity", "place", "velocity", None), None),
-    ("entry", ("gravity", "place", "velocity"), None),
-    ("end_inner", ("end",), None),
-    ("discrete_gradient", ("place", "end"), "normal"),
-    ("gap_gradient", ("place", "end"), "normal"),
-    ("resting_gradient", ("place", "end"), "normal"),
-    ("step_normal", ("place", "end"), "normal"),
-    ("push", ("place", "way", None), "end"),
-    ("rise", ("place", "way", None), None),
-    ("free_rise", ("place", "way"), None),
-    ("turned_push", ("place", "way", None, "vector"), "end"),
-    ("turned_rise", ("place", "way", None, "vector"), None),
-    ("resolve", ("place", None), "place"),
-    ("chord_guess", ("place", "way"), None),
-    ("chord_improve", ("place", "way", None), None),
-    ("chord_normal", ("place", "way", None), "normal"),
+# The roles of the arguments and of the answer, and what is asked with these.
+_FORWARDED: tuple[tuple[tuple[str | None, ...], str | None, tuple[str, ...]], ...] = (
+    ((None,), None, ("gap_of", "level_of")),
+    ((None, None), None, ("gap_slope",)),
+    (("place",), None, ("phi", "polynomial", "inner", "distance", "gap_scale", "out_of", "far")),
+    (("place",), "vector", ("gradient", "inner_gradient", "unit_normal")),
+    (("place",), "place", ("project",)),
+    # Of a flight
+    (("place", "velocity"), None, ("first_hit",)),
+    (("place", "velocity", "vector"), None, ("falling_hit", "safe_time", "course", "outward_acceleration")),
+    (("gravity", "place", "velocity"), None, ("steps", "fall", "entry")),
+    (("gravity", "place", "velocity", None), None, ("refined",)),
+    (("lease",), None, ("reach",)),
+    (("seen",), None, ("level_along",)),
+    (("seen", None), None, ("moving_step",)),
+    (("place", "velocity", "swings"), None, ("passage",)),
+    # Of a step
+    ((), None, ("farthest_push",)),
+    (("end",), None, ("end_inner",)),
+    (("place", "end"), "normal", ("discrete_gradient", "gap_gradient", "resting_gradient", "step_normal")),
+    (("place", "way"), None, ("free_rise", "chord_guess")),
+    (("place", "way", None), None, ("rise", "chord_improve")),
+    (("place", "way", None), "end", ("push",)),
+    (("place", "way", None), "normal", ("chord_normal",)),
+    (("place", "way", None, "vector"), None, ("turned_rise",)),
+    (("place", "way", None, "vector"), "end", ("turned_push",)),
+    (("place", None), "place", ("resolve",)),
     # Of a field: see `Members`
-    ("count", (), None),
-    ("field_hit", ("gravity", "place", "velocity"), None),
-    ("until_next_cell", ("place", "velocity"), None),
-    ("is_in_another", (None, "place"), None),
-    ("count_in_cell", ("place",), None),
-    ("list_in_cell", (None, None, "place", None), None),
-    ("one_in_cell", (None, "place"), None),
-    ("deepest_in_cell", ("place",), None),
-    ("is_there", (None, "place", None), None),
-    ("wall_after", (None, "place", None), None),
-    ("goes_on", (None, None), None),
+    ((), None, ("count",)),
+    ((None, None), None, ("goes_on",)),
+    (("place",), None, ("count_in_cell", "deepest_in_cell")),
+    (("place", "velocity"), None, ("until_next_cell",)),
+    (("gravity", "place", "velocity"), None, ("field_hit",)),
+    ((None, "place"), None, ("is_in_another", "one_in_cell")),
+    ((None, "place", None), None, ("is_there", "wall_after")),
+    ((None, None, "place", None), None, ("list_in_cell",)),
 )
 _CONSTANTS = (
     "side",
@@ -127,14 +107,18 @@ def _forwarded(name: str, roles: tuple[str | None, ...], result: str | None) -> 
     return asked
 
 
-for _name, _roles, _result in _FORWARDED:
-    setattr(Framed, _name, _forwarded(_name, _roles, _result))
+for _roles, _result, _names in _FORWARDED:
+    for _name in _names:
+        setattr(Framed, _name, _forwarded(_name, _roles, _result))
 for _name in _CONSTANTS:
     setattr(Framed, _name, property(lambda self, name=_name: getattr(self.body, name)))  # type: ignore[misc]
 
 
 class Unturned(Framed):
     """A surface in the frame of its body: each way in and out is the identity. Subclasses change what is answered."""
+
+    def flat_normal(self):
+        return self.body.flat_normal()
 
     def _same(self, given):
         return given

@@ -1,4 +1,4 @@
-"""Surfaces at an instant: their gaps at points, what holds their admissible sides, and whether these have any room."""
+"""Surfaces at an instant: gaps at points, boxes around admissible sides, and whether these have a point in common."""
 
 import itertools
 import math

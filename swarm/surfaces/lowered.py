@@ -8,6 +8,7 @@ from typing import Any
 from ..kernel.jit import select
 from .contract import Smooth
 from .frames import Unturned
+from .presence.doors import Ajar
 from .presence.rooms import is_of_room
 from .walls import Field
 
@@ -28,23 +29,6 @@ class Lowered(Unturned):
         return self.gap_of(q)
 
 
-class MetMember(Unturned):
-    """A wall of a field or a room that a contact may be one with, if it is `here`; else one that nothing reaches."""
-
-    body: Any
-    here: Any
-
-    def gap_of(self, q):
-        return select(self.here, self.body.gap_of(q), -1.0)
-
-    def level_of(self, q):
-        return select(self.here, self.body.level_of(q), -1.0)
-
-    def gap_slope(self, q0, q1):
-        slope, bend = self.body.gap_slope(q0, q1)
-        return select(self.here, slope, 0.0), select(self.here, bend, 0.0)
-
-
 def as_met(walls, number):
     """The walls that a contact with this one may be one with: of fields and unions no other bodies, and no other rooms.
 
@@ -54,19 +38,17 @@ def as_met(walls, number):
     for first, wall in walls.shared():
         if isinstance(wall, Field):
             here = (number >= first) & (number < first + wall.count())
-            each = (*each, MetMember(wall.members.wall(number - first), here))
+            each = (*each, Ajar(wall.members.wall(number - first), select(here, 1.0, 0.0)))
         else:
             each = (*each, wall)
     for rooms in walls.joined():
         for room in rooms:
-            here = is_of_room(room, number)
-            each = (*each, *(MetMember(wall, here) for _number, wall, _gentle in room))
+            here = select(is_of_room(room, number), 1.0, 0.0)
+            each = (*each, *(Ajar(wall, here) for _number, wall, _gentle in room))
     return walls.alone(each)
 
 
 def lowered(walls, number, r):
     """All walls, that with this number lowered to the point r."""
-    each: Any = ()
-    for k, wall in enumerate(walls.each):
-        each = (*each, Lowered(wall, select(number == k, wall.gap_of(wall.inner(r)), 0.0)))
-    return walls._replace(each=each)
+    levels = (select(number == k, wall.gap_of(wall.inner(r)), 0.0) for k, wall in enumerate(walls.each))
+    return walls._replace(each=tuple(map(Lowered, walls.each, levels)))

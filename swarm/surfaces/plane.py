@@ -17,11 +17,11 @@ from ..kernel.vector import vec
 from ..motion import Guide, Oscillation, Path, Rotation, Translation, parts_of
 from ..state import Floats
 from .facets.mesh import Mesh
-from .fields.many import Many
+from .fields.many import ManyBodies
 from .outlines.outlined import Outlined
 from .shapes.slab import AXES
 from .shapes.sphere import Sphere
-from .surface import Surface, shown
+from .surface import Surface, shown, slopes_of
 from .upright import upright
 from .wall_law import leave_of, tries_of
 
@@ -150,7 +150,7 @@ def _mended(surface: Surface, across: int) -> str:
     name = "xyz"[across]
     if center is not None and center[across] != 0.0:
         return f"give it a center with {name} = 0, got {center[across]:g} m"
-    if isinstance(surface, Many):
+    if isinstance(surface, ManyBodies):
         return f"give all its bodies centers with {name} = 0, and axes along the plane or across it"
     return f"give it a normal or axes along the plane or along {name}, without round-off"
 
@@ -169,7 +169,7 @@ def _walls_in(surface: Surface, across: int, reach: float) -> tuple[Floats, Floa
         phi, slope = _level(surface, across, points)
         steep = np.sqrt((slope**2).sum(axis=0))
         part = slope[across] / steep
-        if isinstance(surface, Many) and surface.kind is not Sphere:
+        if isinstance(surface, ManyBodies) and surface.kind is not Sphere:
             # As kernels take their axes.
             part = np.where(np.abs(part) <= _ROUND_OFF, 0.0, part)
         here = np.isfinite(part) & (np.abs(phi) <= _NEAR * reach * steep)
@@ -178,11 +178,11 @@ def _walls_in(surface: Surface, across: int, reach: float) -> tuple[Floats, Floa
 
 def _level(surface: Surface, across: int, points: Floats) -> tuple[Floats, Floats]:
     """phi at points (3, N) of the plane, and its gradient, as kernels take it."""
-    if isinstance(surface, Many) or surface.motion is not None:
+    if isinstance(surface, ManyBodies) or surface.motion is not None:
         return surface.phi(points), surface.gradient(points)
     walls, rows = [upright(wall, across) for wall in surface.walls()], vec(points)
     levels = np.array([np.broadcast_to(wall.phi(rows), points.shape[1:]) for wall in walls])
-    slopes = [np.array(np.broadcast_arrays(*wall.gradient(rows), rows.x)[:3]) for wall in walls]
+    slopes = [slopes_of(wall, rows) for wall in walls]
     return levels.max(axis=0), np.choose(np.argmax(levels, axis=0), slopes)
 
 
@@ -195,7 +195,7 @@ def _starts(surface: Surface, across: int, reach: float) -> Floats:
     center = np.array(getattr(surface, "center", (0.0, 0.0, 0.0)))[:, None]
     if math.isfinite(size):
         points.append(center + 2.0 * size * (2.0 * random.random((3, _STARTS)) - 1.0))
-    if isinstance(surface, Many):
+    if isinstance(surface, ManyBodies):
         low, high = (np.where(np.isfinite(corner), corner, 0.0) for corner in surface.corners())
         points += [low + (high - low) * random.random((3, 1)) for _k in range(4)]
     found = np.concatenate(points, axis=1)

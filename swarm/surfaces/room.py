@@ -13,7 +13,7 @@ from .surface import UNBOUNDED, Box, HalfSpace, Surface
 
 Room = tuple[Surface, ...]
 
-# Of the extent, how far a room without end is searched for a point in it.
+# A room without end is searched for a point as far as this many times the extent of its surfaces.
 _REACH = 2.0
 # Where planes leave the volume open, their polyhedron is cut off at this many times the scene's extent.
 _FAR = 1e6

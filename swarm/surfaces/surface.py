@@ -1,8 +1,8 @@
 """A surface as users describe it, checked. As kernels take it, it is a record: see contract.py."""
 
 import math
-from collections.abc import Callable
-from dataclasses import MISSING, dataclass, field, fields, replace
+from collections.abc import Callable, Iterable
+from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -139,9 +139,13 @@ class Surface(Validated):
 
     def __repr__(self) -> str:
         """The call that makes it, omitting defaults."""
-        own = sorted(fields(self), key=lambda field: bool(field.kw_only))
-        changed = [f for f in own if f.default is MISSING or getattr(self, f.name) != f.default]
-        return f"{type(self).__name__}({', '.join(f'{f.name}={getattr(self, f.name)!r}' for f in changed)})"
+        return self._call((), sorted(fields(self), key=lambda field: bool(field.kw_only)))
+
+    def _call(self, given: Iterable[str], named: Iterable[Field[Any]]) -> str:
+        """The call with what is `given` as it is, and those of the named fields that are no defaults."""
+        changed = [one for one in named if one.default is MISSING or getattr(self, one.name) != one.default]
+        arguments = *given, *(f"{one.name}={getattr(self, one.name)!r}" for one in changed)
+        return f"{type(self).__name__}({', '.join(arguments)})"
 
     def numbers(self) -> Any:
         """The record that kernels take in place of this description, before it is rotated."""
@@ -467,7 +471,7 @@ class Surface(Validated):
         """That gradient in the frame in which the surface is given."""
         rows = self._own_rows(points, time)
         with np.errstate(all="ignore"):
-            parts = [np.array(np.broadcast_arrays(*wall.gradient(rows), rows.x)[:3]) for wall in self.walls()]
+            parts = [slopes_of(wall, rows) for wall in self.walls()]
             largest = np.argmax([wall.phi(rows) for wall in self.walls()], axis=0)
         return np.asarray(np.choose(largest, parts))
 
@@ -501,12 +505,15 @@ class Surface(Validated):
 
 def _level_set(wall: Any) -> LevelSet:
     """The level set of a wall as kernels take it."""
+    return (
+        lambda points: np.broadcast_to(wall.phi(vec(points.T)), len(points)),
+        lambda points: np.ascontiguousarray(slopes_of(wall, vec(points.T)).T),
+    )
 
-    def gradient(points: NDArray[np.float64]) -> NDArray[np.float64]:
-        rows = vec(points.T)
-        return np.stack(np.broadcast_arrays(*wall.gradient(rows), rows.x)[:3], axis=1)
 
-    return (lambda points: np.broadcast_to(wall.phi(vec(points.T)), len(points)), gradient)
+def slopes_of(wall: Any, rows: Vec) -> NDArray[np.float64]:
+    """The gradient of phi of a wall as kernels take it, at points, (3, N)."""
+    return np.array(np.broadcast_arrays(*wall.gradient(rows), rows.x)[:3])
 
 
 def is_on_axis(point: Vector, axis: Vector, center: Vector) -> bool:

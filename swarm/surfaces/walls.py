@@ -75,7 +75,7 @@ class Walls(Record):
     # For each union, for each of its rooms, for each wall of the room: 1/the steepness of its level. See rooms.py.
     unions: tuple[Any, ...] = ()
     slack: Any = None  # a distance that is round-off where rooms meet [m]
-    inset: Any = None  # where rooms touch, how far inside of its wall what meets one is put [m]
+    inset: Any = None  # where rooms touch, how far inside of a wall a particle is put that meets it [m]
 
     if TYPE_CHECKING:
 
@@ -346,3 +346,27 @@ for _name, _neutral in _ASKED.items():
 def all_walls(surfaces: Iterable[Any]) -> Walls:
     """The walls of surfaces, in their order."""
     return Walls(tuple(wall for surface in surfaces for wall in surface.walls()))
+
+
+def penetration(walls, r):
+    """Largest distance outside, max(g, 0)/|grad g|, over all walls."""
+    deepest = 0.0
+    for _number, wall in reversed(walls.shared()):
+        distance = wall.members.deepest_in_cell(r) if isinstance(wall, Field) else wall.distance(r)
+        deepest = select(distance > deepest, distance, deepest)
+    for rooms in walls.joined():
+        distance = _out_of_all(rooms, r)
+        deepest = select(distance > deepest, distance, deepest)
+    return deepest
+
+
+def _out_of_all(rooms, r):
+    """Distance outside of the nearest room of a union."""
+    least = math.inf
+    for room in rooms:
+        farthest = 0.0
+        for _number, wall, _gentle in room:
+            distance = wall.distance(r)
+            farthest = select(distance > farthest, distance, farthest)
+        least = select(farthest < least, farthest, least)
+    return least

@@ -1,7 +1,6 @@
 """Many bodies as triangles, each on a grid of its own, and the box in which a scene is drawn."""
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,8 +94,8 @@ def each_body(surface: Surface, box: Corners) -> tuple[Triangles, NDArray[np.int
     first = 0
     for k in range(0, len(solids), max(1, len(solids) // _MOST_BODIES)):
         solid = solids[k]
-        low, high = (np.array(corner) for corner in replace(solid, side="inside").bounds())  # type: ignore[call-arg]
-        low, high = own = _around(np.stack([np.maximum(low, box[0]), np.minimum(high, box[1])]), box)
+        low, high = (np.array(corner) for corner in solid.enclosing_box())
+        low, high = own = around(np.stack([np.maximum(low, box[0]), np.minimum(high, box[1])]), box)
         axes = _axes(own, _BODY)
         gap = -solid.phi(np.array(np.meshgrid(*axes, indexing="ij")).reshape(3, -1)).reshape(3 * (_BODY,))
         vertices, triangles, normals = _mesh(gap, own) if (low < high).all() else NOTHING
@@ -109,10 +108,10 @@ def each_body(surface: Surface, box: Corners) -> tuple[Triangles, NDArray[np.int
     return (vertices, triangles, normals), np.concatenate(numbers)
 
 
-def _around(points: Floats, box: Corners) -> Corners:
-    """The box of some points, a little larger, in the box of all."""
+def around(points: Floats, box: Corners, count: int = _POINTS) -> Corners:
+    """The box of some points, larger by a few cells of a grid of so many points along each side, in the box of all."""
     low, high = points.min(axis=0), points.max(axis=0)
-    margin = 2.0 * _MARGIN * np.maximum(high - low, 0.1 * (high - low).max()) / (_POINTS - 1.0)
+    margin = 2.0 * _MARGIN * np.maximum(high - low, 0.1 * (high - low).max()) / (count - 1.0)
     return np.maximum(low - margin, box[0]), np.minimum(high + margin, box[1])
 
 

@@ -15,6 +15,7 @@ from ..surfaces.rotation import normalized
 from ..surfaces.surface import Surface
 from .curves import runs
 from .cut import Level, SmoothSurface
+from .gridded import Corners, around
 from .parts import Part
 
 # Points along each side of the grid on which curves are found, and of a small body on a grid of its own.
@@ -28,7 +29,6 @@ _BEYOND = 1.2
 # The height of a ribbon, as a part of the width of the scene.
 _HEIGHT = 0.02
 
-Corners = tuple[Floats, Floats]
 Strip = tuple[Floats, NDArray[np.int64], Floats]
 
 
@@ -65,11 +65,7 @@ class PlaneWalls:
             return []
         # Again, on a grid around this surface only.
         points = np.concatenate(found)[:, list(self._axes)]
-        low, high = points.min(axis=0), points.max(axis=0)
-        margin = 2.0 * _MARGIN * np.maximum(high - low, 0.1 * (high - low).max()) / (_POINTS - 1.0)
-        return self._of(
-            i, self._curves((np.maximum(low - margin, self._box[0]), np.minimum(high + margin, self._box[1])))
-        )
+        return self._of(i, self._curves(around(points, self._box, _POINTS)))
 
     def of_part(self, part: Part) -> list[Floats]:
         """The curves of a part of a surface where it is a wall, each end where it meets another one."""
@@ -81,13 +77,12 @@ class PlaneWalls:
         low, high = (np.array(corner)[list(self._axes)] for corner in box_of(surface.filled(), self._time))
         low, high = np.maximum(low, self._box[0]), np.minimum(high, self._box[1])
         margin = _MARGIN * (high - low) / (_POINTS - 1.0)
-        sides = [np.linspace(a, b, _POINTS) for a, b in zip(low - margin, high + margin, strict=True)]
-        grid, found = at.given(self._placed(np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)).T).T, list[Floats]()
+        found = list[Floats]()
         for wall in walls if (low < high).all() else ():
-            with np.errstate(all="ignore"):
-                level = np.nan_to_num(wall.phi(grid), nan=1.0).reshape(_POINTS, _POINTS)
-            lines = contourpy.contour_generator(sides[0], sides[1], level).lines(0.0)
-            curves = [self._placed(np.asarray(line)) for line in lines]
+            curves = self._lines(
+                (low - margin, high + margin), _POINTS,
+                lambda points: np.nan_to_num(wall.phi(at.given(points.T).T), nan=1.0),  # noqa: B023
+            )  # fmt: skip
             found += self._cut(part, wall, [other for other in walls if other is not wall], curves, at)
         return found
 
@@ -135,12 +130,19 @@ class PlaneWalls:
 
     def _curves(self, box: Corners) -> list[Floats]:
         """All walls in a box."""
-        sides = [np.linspace(low, high, _POINTS) for low, high in zip(*box, strict=True)]
-        grid = self._placed(np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2))
+
+        def largest_gap(points: Floats) -> Floats:
+            gap = self._scene.gaps(points.T, self._time).max(axis=0)
+            return np.asarray(np.where(np.isfinite(gap), gap, np.max(gap, where=np.isfinite(gap), initial=1.0)))
+
+        return self._lines(box, _POINTS, largest_gap)
+
+    def _lines(self, box: Corners, count: int, level: Level) -> list[Floats]:
+        """The curves in a box of the plane at which a level is 0, by so many points of a grid along each side."""
+        sides = [np.linspace(low, high, count) for low, high in zip(*box, strict=True)]
         with np.errstate(all="ignore"):
-            gap = self._scene.gaps(grid.T, self._time).max(axis=0)
-        gap = np.where(np.isfinite(gap), gap, np.max(gap, where=np.isfinite(gap), initial=1.0))
-        lines = contourpy.contour_generator(sides[0], sides[1], gap.reshape(_POINTS, _POINTS)).lines(0.0)
+            values = level(self._placed(np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)))
+        lines = contourpy.contour_generator(sides[0], sides[1], values.reshape(count, count)).lines(0.0)
         return [self._placed(np.asarray(line)) for line in lines]
 
     def _of(self, i: int, curves: list[Floats]) -> list[Floats]:
@@ -163,10 +165,7 @@ class PlaneWalls:
             far = _BEYOND * (solid.extent() - float(np.abs(center).max()))
             reach = max(reach, far)
             low, high = center - reach, center + reach
-        sides = [np.linspace(a, b, _BODY) for a, b in zip(low, high, strict=True)]
-        grid = self._placed(np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2))
-        lines = contourpy.contour_generator(sides[0], sides[1], solid.phi(grid.T).reshape(_BODY, _BODY)).lines(0.0)
-        return [self._placed(np.asarray(line)) for line in lines]
+        return self._lines((low, high), _BODY, lambda points: solid.phi(points.T))
 
     def _placed(self, points: Floats) -> Floats:
         """Points of the plane (N, 2) in space (N, 3)."""

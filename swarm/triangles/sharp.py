@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..motion import Pose, pose
 from ..state import Floats, Indices
 from ..surfaces import Cone
+from ..surfaces.facets.mending import components
 from ..surfaces.facets.mesh import Mesh
 from ..surfaces.rotation import matrix, normalized
 from ..surfaces.surface import Surface
@@ -267,9 +266,9 @@ def shaded(points: Floats, triangles: Indices) -> tuple[Floats, Indices, Floats]
     ]  # fmt: skip
     same = [triangles[mine, k // 3] == triangles[other, k % 3] for k in range(9)]
     first, second = (np.concatenate([pair[k][here] for pair, here in zip(pairs, same, strict=True)]) for k in (0, 1))
-    graph = coo_matrix((np.ones(len(first), np.int8), (first, second)), shape=2 * (every.size,))
-    number, corner = connected_components(graph, directed=False)
+    corner = components(np.stack([first, second], axis=1), every.size)
+    number = int(corner.max(initial=-1)) + 1
     made, normals = np.empty((number, 3)), np.zeros((number, 3))
     made[corner] = points[triangles.ravel()]
     np.add.at(normals, corner, np.repeat(normal, 3, axis=0))
-    return made, corner.reshape(-1, 3).astype(np.int64), normalized(normals, 1)
+    return made, corner.reshape(-1, 3), normalized(normals, 1)

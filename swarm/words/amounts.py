@@ -19,7 +19,16 @@ def many(count: float) -> str:
     return f"{int(count)}" if abs(count) < 10_000 else f"{int(count):,}".replace(",", " ")
 
 
-def counted_in_words(count: int, noun: str, plural: str = "") -> str:
+def counted(count: int, noun: str) -> str:
+    """So many of a thing, in digits.
+
+    >>> counted(1, "ball"), counted(2, "ball")
+    ('1 ball', '2 balls')
+    """
+    return f"{many(count)} {noun if count == 1 else plural_of(noun)}"
+
+
+def counted_in_words(count: int, noun: str) -> str:
     """So many of a thing, small numbers in words.
 
     >>> counted_in_words(2, "ball"), counted_in_words(78, "peg"), counted_in_words(1, "egg")
@@ -27,8 +36,7 @@ def counted_in_words(count: int, noun: str, plural: str = "") -> str:
     """
     if count == 1:
         return one(noun)
-    number = _SMALL[count] if count < len(_SMALL) else many(count)
-    return f"{number} {plural or plural_of(noun)}"
+    return f"{_SMALL[count]} {plural_of(noun)}" if count < len(_SMALL) else counted(count, noun)
 
 
 def one(noun: str) -> str:

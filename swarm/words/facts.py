@@ -15,7 +15,7 @@ from ..methods import ALL_METHODS, Method
 from ..scene import Scene
 from ..surfaces.union import part_at
 from . import nouns, titles
-from .amounts import amount, amounts, direction, listed, many, plain, plural_of
+from .amounts import amount, amounts, counted, direction, listed, many, plain
 from .content import Content, content_of, content_of_result
 from .statements import Statement, rows_of
 from .verdicts import judged
@@ -155,7 +155,7 @@ def of_sources(content: Content) -> list[Statement]:
     stated, (times, sources) = [], content.births
     for k in range(content.seen["born"].shape[1]):
         came = np.flatnonzero((sources == k) & (times <= content.seen["time"][-1]))
-        text = _counted(len(came), "particle" if end.radius is None else "ball")
+        text = counted(len(came), "particle" if end.radius is None else "ball")
         if len(came):
             text += "" if end.radius is None else f" of {_range(end.radius[came], 'm')} radius"
             first, last = float(times[came].min()), float(times[came].max())
@@ -175,8 +175,7 @@ def _of_body(body: Body | None) -> list[Statement]:
         "point": body, "link": body.links, "spring": body.springs, "elastic edge": edges, "anchor": body.anchors,
         "guide": body.guides, "cavity": body.cavities,
     }  # fmt: skip
-    counted = [_counted(len(some), name) for name, some in parts.items() if len(some)]
-    return [Statement("body", ", ".join(counted))]
+    return [Statement("body", ", ".join(counted(len(some), name) for name, some in parts.items() if len(some)))]
 
 
 def _packing(content: Content) -> list[Statement]:
@@ -193,7 +192,7 @@ def of_surroundings(scene: Scene, most: int | None = None, impacts: Sequence[int
     stated, names, count = [], nouns.labels(scene), len(scene.surfaces)
     shown = count if most is None or count <= most else most - 1
     for i, surface in enumerate(scene.surfaces[:shown]):
-        met = f"; {_counted(int(impacts[i]), 'impact')}" if len(impacts) else ""
+        met = f"; {counted(int(impacts[i]), 'impact')}" if len(impacts) else ""
         stated.append(Statement(f"surface {i}, {names[i, ()]}", nouns.in_full(surface, scene) + met))
     if shown < count:
         stated.append(Statement("more surfaces", many(count - shown)))
@@ -282,7 +281,3 @@ def of_numbers(seen: dict[str, Any]) -> list[Statement]:
             if each:
                 stated.append(Statement(name.replace("_", " "), ", ".join([*each[: MOST - len(more)], *more])))
     return stated
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{many(number)} {noun if number == 1 else plural_of(noun)}"

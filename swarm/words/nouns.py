@@ -12,7 +12,7 @@ from ..surfaces.facets.mesh import Mesh
 from ..surfaces.presence.doors import Opening
 from ..surfaces.surface import Surface
 from ..surfaces.union import Place, part_at
-from .amounts import amount, amounts, counted_in_words, direction, listed, many, one, place, plain, plural_of
+from .amounts import amount, amounts, counted, counted_in_words, direction, listed, many, one, place, plain
 
 # Within this angle of straight down or up a plane is a floor or a lid [cosine].
 _LEVEL = 1.0 - 1e-6
@@ -56,7 +56,7 @@ def labels(scene: Scene) -> dict[tuple[int, Place], str]:
     for i, where in places:
         surface = part_at(scene.surfaces[i], where)
         number, noun = number_of(surface), noun_of(surface, scene)
-        nouns[i, where] = noun if number == 1 else f"{many(number)} {plural_of(noun)}"
+        nouns[i, where] = noun if number == 1 else counted(number, noun)
     often, seen, names = Counter(nouns.values()), Counter[str](), {}
     for key, noun in nouns.items():
         seen[noun] += 1

@@ -7,12 +7,11 @@ import numpy as np
 
 from ..bodies.body import Body
 from ..methods import Method
-from ..particles import Particles
 from ..scene import Scene
 from ..surfaces.surface import Surface
 from ..surfaces.union import part_at
 from . import nouns
-from .amounts import amount, amounts, counted_in_words, listed, many, one, plural_of
+from .amounts import amount, amounts, counted, counted_in_words, listed, many, one
 
 # Most letters of a title.
 LONGEST = 90
@@ -21,19 +20,14 @@ _BREVITY = range(7)
 _FEW = 3
 
 
-def of_scene(scene: Scene) -> str:
-    """What a scene is: the vessel, what is in it, gravity, and what its walls do.
+def of_scene(scene: Scene, brief: int = 0) -> str:
+    """What a scene is: the vessel, what is in it, gravity, and what its walls do; less the larger `brief` is.
 
     >>> import swarm
     >>> ball = swarm.Sphere(0.2, side="outside")
     >>> of_scene(swarm.Scene([swarm.Ellipsoid((0.5, 0.5, 0.7)), ball], gravity=(0.0, 0.0, -9.81)))
     'in an ellipsoid with a ball in it, under gravity'
     """
-    return _brief(scene, 0)
-
-
-def _brief(scene: Scene, brief: int) -> str:
-    """The same, with less the larger `brief` is."""
     solids = [one for one in scene.surfaces if one.is_solid()]
     around = [one for one in scene.surfaces if not one.is_solid()]
     flat = scene.plane is not None
@@ -110,24 +104,16 @@ def _laws(scene: Scene) -> str:
 # --- What runs -------------------------------------------------------------------------------------------
 
 
-def _so_many(count: int, noun: str) -> str:
-    return f"1 {noun}" if count == 1 else f"{many(count)} {plural_of(noun)}"
-
-
 def of_particles(content: Any) -> str:
     """What runs: so many particles, balls or bodies.
 
     `content` is the `Content` of a run.
     """
-    count, body, radius = count_of(content), content.body, _radius(content)
+    count, body, frame = count_of(content), content.body, content.frames.get("start", content.frames.get("end"))
+    radius = None if frame is None else frame.radius
     if body is not None:
-        copies = count // len(body)
-        noun = noun_of_body(body)
-        return _so_many(copies, noun)
-    noun = "particle"
-    if radius is not None:
-        noun = "ball" if content.scene.plane is None else "disc"
-    text = _so_many(count, noun)
+        return counted(count // len(body), noun_of_body(body))
+    text = counted(count, "particle" if radius is None else "ball" if content.scene.plane is None else "disc")
     if radius is not None and len(radius):
         low, high = float(np.nanmin(radius)), float(np.nanmax(radius))
         size = amount(low, "m") if low == high else amounts([low, high], "m").replace(" and ", " to ")
@@ -163,11 +149,6 @@ def noun_of_body(body: Body) -> str:
     return f"{tied} of {counted_in_words(points, 'point')}" if points > 1 else "tied point"
 
 
-def _radius(content: Any) -> Any:
-    frame: Particles | None = content.frames.get("start", content.frames.get("end"))
-    return None if frame is None or content.body is not None else frame.radius
-
-
 def of_method(method: Method) -> str:
     """A method as a title says it: its name and its step.
 
@@ -188,7 +169,7 @@ def title(content: Any) -> str:
     step, name = of_method(content.method), of_method(content.method).split(",")[0]
     for brief in _BREVITY:
         method = step if brief < 2 else name
-        text = f"{what}{came} {_brief(content.scene, brief)}: {method}, {end}"
+        text = f"{what}{came} {of_scene(content.scene, brief)}: {method}, {end}"
         if len(text) < LONGEST:
             return text
     return f"{what}: {name}, {end}"

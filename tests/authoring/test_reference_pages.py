@@ -14,7 +14,6 @@ from swarm.authoring.docstrings import entries_of, meanings_of, sections_of
 from swarm.authoring.keys import tables
 from swarm.authoring.reference import topics, write
 from swarm.commands.cli import app
-from swarm.commands.docs import commands
 from swarm.common.catalog import OBSERVABLES
 
 # Arguments that a file or another call gives.
@@ -24,7 +23,7 @@ MADE = {"mesh_weld", "args", "kwargs", "common"}
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     target = tmp_path_factory.mktemp("docs") / "pages"
-    write(target, commands(app))
+    write(target, app.commands)
     return target
 
 

@@ -21,7 +21,7 @@ from swarm.fleet import connection, jobs, local, sharded_run, shards
 from swarm.run import machine
 from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of
-from swarm.run.progress import lines
+from swarm.run.progress import display_by, in_lines
 from swarm.run.simulation import carry_out
 
 N = 600
@@ -400,7 +400,7 @@ def test_code_that_a_file_names_reaches_the_workers(client, tmp_path, monkeypatc
 def test_lines_of_progress_come_from_a_cluster_too(client, tmp_path, capsys):
     swarm.simulate(
         *cavity(), until=1.0, every=0.25, compile="never", trajectory=tmp_path / "run.h5", cluster=client,
-        progress=lines(0.0),
+        progress=display_by(in_lines(0.0), 0.0),
     )  # fmt: skip
     printed = capsys.readouterr().err.splitlines()
     assert printed

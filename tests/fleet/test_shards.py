@@ -180,10 +180,10 @@ def test_any_number_of_shards_gives_the_same_bits(name, count, alone, on_a_clust
     require_same_observables(end, other)
     for key in ("position", "velocity", "mass"):
         assert the_same(getattr(end.particles, key), getattr(other.particles, key)), key
-    assert the_same(end.impacts, other.impacts)
+    assert the_same(end.impacts_per_particle, other.impacts_per_particle)
     assert the_same(end.escape_time, other.escape_time)
     assert the_same(end.birth_time, other.birth_time)
-    assert int(end.impacts.sum()) > 20
+    assert int(end.impacts_per_particle.sum()) > 20
     assert (end.multipliers is None) == (other.multipliers is None)
     for mine, its in zip(end.multipliers or (), other.multipliers or (), strict=True):
         assert the_same(mine, its)
@@ -204,7 +204,7 @@ def test_workers_are_sent_the_modules_that_are_not_installed(on_a_cluster, tmp_p
     alone = swarm.simulate(job.scene, job.start(), job.method, **keywords)
     assert the_same(shown.particles.position, alone.particles.position)
     assert the_same(shown.observables["rank"], alone.observables["rank"])
-    assert int(shown.impacts.sum()) > 20
+    assert int(shown.impacts_per_particle.sum()) > 20
     # NumPy is not sent: scenes of this kind hold its numbers, which would be pickled with their classes.
     assert on_a_cluster(*periodic(), 2, until=0.4, every=0.2, compile="never", trajectory=tmp_path / "cell.h5")
 
@@ -224,7 +224,7 @@ def test_workers_are_sent_the_modules_of_a_package(on_a_cluster, tmp_path, monke
     shown = on_a_cluster(job.scene, job.start(), job.method, 2, **keywords, trajectory=tmp_path / "run.h5")
     alone = swarm.simulate(job.scene, job.start(), job.method, **keywords)
     assert the_same(shown.particles.position, alone.particles.position)
-    assert int(shown.impacts.sum()) > 20
+    assert int(shown.impacts_per_particle.sum()) > 20
 
 
 def require_same_file(one, other):

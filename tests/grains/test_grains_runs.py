@@ -94,7 +94,7 @@ def test_friction_is_that_of_the_same_contacts_when_lists_are_made_anew():
         # In reverse, so that of each pair the other ball comes first.
         for rows in run._world.grains:
             rows[:] = rows[::-1].copy()
-        run._list_with(kept)
+        run._list(kept)
         assert frictions(run) == before
         assert frictions_at_walls(run) == at_walls
         assert len(before) > 1 < len(at_walls)

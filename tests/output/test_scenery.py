@@ -16,6 +16,7 @@ from swarm.pictures.eye import eye_at, eye_for
 from swarm.pictures.raster import Raster
 from swarm.pictures.scenery import Scenery, silhouette
 from swarm.triangles.shapes import cell_of, shapes_of
+from swarm.words.amounts import amount
 
 NOWHERE = np.zeros((3, 1))
 RED = 0xFF0000FF
@@ -149,8 +150,8 @@ def test_a_triangle_is_where_it_is_and_the_nearest_one_is_seen():
 
 def test_lengths_are_round():
     assert [triad.round_length(x) for x in (0.28, 1.0, 4.99, 5.0, 7e-6)] == pytest.approx([0.2, 1.0, 2.0, 5.0, 5e-6])
-    lengths = [triad.length_in_words(x) for x in (0.2, 2.0, 5e-3, 2e-6, 5e3, 1e-8, 1e-13)]
-    assert lengths == ["20 cm", "2 m", "5 mm", "2 µm", "5 km", "10 nm", "1e-13 m"]
+    lengths = [amount(x, "m") for x in (0.2, 2.0, 0.02, 5e-3, 2e-6, 5e3, 1e-8)]
+    assert lengths == ["0.2 m", "2 m", "20 mm", "5 mm", "2 µm", "5 km", "10 nm"]
 
 
 def test_in_a_plane_what_closed_walls_enclose_is_filled():

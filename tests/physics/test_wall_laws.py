@@ -15,6 +15,7 @@ from test_sessions import require_resumed_is_whole
 import swarm
 from examples import own_law
 from examples.own_law import Viscoelastic
+from swarm.contact.laws import Owned, Some
 from swarm.kernel.jit import select
 from swarm.kernel.random import Stream
 from swarm.kernel.vector import dot, norm, vec
@@ -258,6 +259,16 @@ class Into(swarm.WallLaw):
         return v - 2.0 * select(dot(v, v) > 1e4, 0.25, 1.0) * dot(v - u, n) * n
 
 
+class Damped(swarm.WallLaw):
+    """A restitution that is written relative to the wall."""
+
+    e: float
+
+    def leave(self, v, n, u, random, mass):
+        b = -dot(v - u, n)
+        return u + (v - u + b * n) + self.e * b * n
+
+
 class Through(swarm.WallLaw):
     def leave(self, v, n, u, random, mass):
         return v
@@ -273,6 +284,20 @@ def test_a_law_that_sends_a_particle_into_the_wall_ends_the_run(tier):
     start = swarm.fill(scene, 5, speed=200.0, seed=1)
     with pytest.raises(swarm.RunError, match=r"particle \d+.*law"):
         swarm.simulate(scene, start, swarm.Impact(), until=1.0, compile=tier)
+
+
+def test_a_speed_away_from_a_moving_wall_may_be_round_off_of_the_velocity_of_the_wall():
+    """A law that adds the wall's velocity to one that is 1e-15 of it sends as many particles into it as away from it."""
+    one, random, into = Some((Damped(0.5),), 0.0, 1.0), np.random.default_rng(1), 0
+    for _try in range(200):
+        n, u = (vec(random.normal(size=3)) for _ in range(2))
+        n = n * (1.0 / norm(n))
+        ended = Owned((one,)).leave(0, u - random.uniform(0.0, 1e-15) * n, n, u, Stream(0, 0, 0, 0, None), 1.0)
+        into += dot(ended.v - u, n) < 0.0
+        assert ended.is_right
+    assert into > 5
+    far = Owned((Some((Through(),), 0.0, 1.0),)).leave(0, u - 1e-13 * n, n, u, Stream(0, 0, 0, 0, None), 1.0)
+    assert not far.is_right
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from conftest import every_pair
 
 import swarm
 from swarm.kernel.vector import Vec
-from swarm.surfaces.data import flight
+from swarm.surfaces.data import sampled_numbers
 from swarm.surfaces.time_of_impact.march import march
 
 pytestmark = pytest.mark.physics
@@ -70,13 +70,13 @@ def test_it_flies_on_along_the_tangent(surface, center, given, monkeypatch):
 
 def test_the_steps_of_that_flight_are_few(monkeypatch):
     """From the place where it lets go to 1e-6 off the wall: some hundreds, not 1e-16 of the time each."""
-    count, one = [0], flight.SampledNumbers._safe_step
+    count, one = [0], sampled_numbers.SampledNumbers._safe_step
 
     def counted(*arguments):
         count[0] += 1
         return one(*arguments)
 
-    monkeypatch.setattr(flight.SampledNumbers, "_safe_step", counted)
+    monkeypatch.setattr(sampled_numbers.SampledNumbers, "_safe_step", counted)
     center = (0.37, -0.21, 0.43)
     wall, r = sampled(center, 0.9).walls()[0], Vec(*center)
     v, g = Vec(1.0, 0.0, -8.9e-16), Vec(0.0, 1.0, 0.0)

@@ -15,11 +15,11 @@ from swarm.kernel.vector import Vec, vec
 from swarm.run.base import BaseRun
 from swarm.run.engine import Run
 from swarm.serialization import tables
-from swarm.surfaces.depth import penetration
 from swarm.surfaces.facets import free_room as room
 from swarm.surfaces.facets.facet_cells import blocks_of, flight_in, from_middle
 from swarm.surfaces.fields.members import member
 from swarm.surfaces.time_of_impact.rising import Jerk
+from swarm.surfaces.walls import penetration
 
 BOX = trimesh.creation.box((1.0, 2.0, 3.0))
 WIDTHS = (0.5, 1.0, 1.5)

@@ -10,7 +10,7 @@ from conftest import call
 
 import swarm
 from swarm.kernel.vector import Vec
-from swarm.surfaces.facets.made import triangles_of_balls
+from swarm.surfaces.balls.facet import triangles_of_balls
 
 TURN = (0.8, 0.1, -0.5, 0.3)
 # One line a shape: what it is, and how far from the origin balls are looked at.

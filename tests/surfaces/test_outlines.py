@@ -13,9 +13,9 @@ from swarm.kernel.vector import Vec, vec
 from swarm.run.base import BaseRun
 from swarm.serialization import tables
 from swarm.surfaces import ALL_SURFACES
-from swarm.surfaces.depth import penetration
 from swarm.surfaces.outlines.outline import Outline
 from swarm.surfaces.time_of_impact import flights
+from swarm.surfaces.walls import penetration
 
 L = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
 CURVED = [(0, 0), (2, 0, -0.4), (2, 1), (1, 1, 0.6), (1, 2, -0.3), (0, 2)]

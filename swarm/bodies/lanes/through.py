@@ -1,7 +1,7 @@
 """Walls with edges, such as the facets of a mesh: the first one that the straight way of a contact point crosses.
 
 Such a wall is present only within its edges, and its distance says nothing about places deep behind it or in other
-cells. The way from the start to the end of a step tells which wall a body has passed.
+cells. The way from the start to the end of a step tells which wall a contact point has passed.
 """
 
 import math

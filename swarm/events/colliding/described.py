@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled_scene import CompiledScene
-from ...contact.laws import NONE
 from ...kernel.arrays import aligned
 from ...pairs import Pairs
 from ...particles import Particles
@@ -120,8 +119,8 @@ def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Fl
     """Return the `Domain` of the balls, the balls at the start, and the length of an epoch [s]."""
     assert particles.radius is not None
     scene = compiled.scene
-    scenery = scenery_of(compiled, 0.0) if scene.reacts() else None
-    laws = compiled.laws or NONE if scenery is None else scenery.laws
+    scenery = scenery_of(compiled, 0.0)
+    laws = scenery.laws
     pairs = scene.pairs or Pairs()
     loss, turning = None, None
     if particles.spin is not None:
@@ -133,15 +132,12 @@ def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Fl
     epoch = _epoch_of(scene, particles, grid)
     flock = flock_of(particles, grid, loss is not None)
     shortest = max(_SHORTEST * epoch, 0.0 if loss is None else loss.duration)
-    walls = compiled.walls(0.0) if scenery is None else scenery.given
     kinds = kinds_of(particles, laws.may_wait)
     if laws.may_wait:
         flock = flock._replace(holds=1.0)
-    made = Domain(walls, laws, scene.pull(), grid, kinds, loss, shortest)
-    made = made._replace(turning=turning)
-    if scene.gravity is not None:
-        # Also without a loss of energy, as balls may start at rest on a floor.
-        made = made._replace(repose=repose_of(math.hypot(*scene.gravity), particles.radius))
+    # Also without a loss of energy, as balls may start at rest on a floor.
+    repose = None if scene.gravity is None else repose_of(math.hypot(*scene.gravity), particles.radius)
+    made = Domain(scenery.given, laws, scene.pull(), grid, kinds, loss, shortest, repose=repose, turning=turning)
     return made, flock, epoch
 
 

@@ -23,7 +23,7 @@ LISTED, STRIKES, SINCE, COUNTS = 0, 1, 2, 3
 
 
 class Heavy(Record):
-    """The walls with a mass; their numbers follow the numbers of the walls without a mass."""
+    """The walls with a mass; their numbers follow the numbers of all other walls."""
 
     walls: Any  # each `Reacting`
     ways: Any  # the `Freedom` of each surface with a mass

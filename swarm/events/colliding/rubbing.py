@@ -17,7 +17,7 @@ from ...contact.reflection import given, relative, wall_velocity
 from ...kernel.arrays import index
 from ...kernel.jit import Array, outlined, select
 from ...kernel.record import Record
-from ...kernel.vector import ZERO, Vec, cross, dot, either, square
+from ...kernel.vector import ZERO, column, cross, dot, either, put, square
 
 # The parts of a stopped slip that the velocity takes, and R times the spin: they add up to 1.
 _STOP, _TURN = INERTIA / (1.0 + INERTIA), 1.0 / (1.0 + INERTIA)
@@ -31,14 +31,13 @@ class BallSpins(Record):
 
     def at(self, i):
         """The spin of a ball."""
-        k = index(i)
-        return Vec(self.spin[0, k], self.spin[1, k], self.spin[2, k])
+        return column(self.spin, 0, index(i))
 
     def add(self, i, change):
         """Change the spin of a ball; return twice the energy per mass and R^2 that it loses."""
-        k, before = index(i), self.at(i)
+        before = self.at(i)
         after = before + change
-        self.spin[0, k], self.spin[1, k], self.spin[2, k] = after
+        put(self.spin, 0, index(i), after)
         return INERTIA * (square(before) - square(after))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...compiled_scene import REACTING, CompiledScene
 from ...contact.laws import NONE, Laws
-from ...kernel.vector import Vec, vec
+from ...kernel.vector import ZERO, Vec, vec
 from ...motion import Guide, Rotation, speed_at_start, unit_axis
 from ...scene import Scene
 from ...state import Floats
@@ -23,8 +23,9 @@ from .strikes import Reacting
 
 def scenery_of(compiled: CompiledScene, moment: float) -> SceneWalls:
     """Return the walls of a scene in the frame that ends at a moment [s]."""
-    scene, given = compiled.scene, compiled.of_no_mass
-    reacts, numbering = np.array([surface.reacts() for surface in scene.surfaces]), compiled.numbering
+    scene = compiled.scene
+    given = compiled.of_no_mass if scene.reacts() else compiled
+    reacts, numbering = np.array([surface.reacts() for surface in scene.surfaces], bool), compiled.numbering
     stay = np.flatnonzero(~reacts[numbering.members[0]])
     return SceneWalls(
         Walls(()) if given is None else given.walls(moment),
@@ -127,6 +128,13 @@ def freedoms_of(compiled: CompiledScene, velocity: Floats) -> Freedoms:
         if isinstance(wall.freedom, Pendulum):
             wall.freedom.expand(made)
     return made
+
+
+def bring_walls(scenery: SceneWalls, freedoms: Freedoms, t: float) -> None:
+    """Move the walls to a time, from which their motions are then counted."""
+    for wall in scenery.reacting:
+        wall.freedom.push(freedoms, t, ZERO, ZERO)
+    freedoms.time.fill(0.0)
 
 
 def walls_now(compiled: CompiledScene, scenery: SceneWalls, freedoms: Freedoms) -> Walls:

@@ -298,13 +298,6 @@ def lease(scenery, freedoms, clock):
     clock[TAKEN] = 0.0
 
 
-@long_kernel
-def settle(scenery, freedoms, t):
-    """Move the walls to a time of the frame, from which their motions are counted."""
-    for wall in scenery.reacting:
-        wall.freedom.push(freedoms, t, ZERO, ZERO)
-
-
 def _list(queue, close, i):
     """List particle i if it is near; return the number of listed particles."""
     if queue.near[i] and not queue.listed[i]:

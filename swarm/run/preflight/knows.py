@@ -545,8 +545,7 @@ CAPABILITIES = (
         ),
     }),
     Capability("restitution", _of_walls("restitution", 1.0), {
-        (BASELINE,): _with_method("restitution", "1"),
-        (SOFT_BODIES, PAPER_BODIES): _with_method("restitution", "1"),
+        (BASELINE, SOFT_BODIES, PAPER_BODIES): _with_method("restitution", "1"),
         (CHORDS,): _LOSES,
     }),
     Capability("restitution under gravity", _losses_under_gravity, {
@@ -557,8 +556,7 @@ CAPABILITIES = (
         ),
     }, within="restitution"),
     Capability("friction", _of_walls("friction", 0.0), {
-        (BASELINE,): _with_method("friction", "0"),
-        (SOFT_BODIES, PAPER_BODIES): _with_method("friction", "0"),
+        (BASELINE, SOFT_BODIES, PAPER_BODIES): _with_method("friction", "0"),
         (CHORDS,): _LOSES,
     }),
     Capability("rolling", _of_walls("rolling", 0.0), {
@@ -635,15 +633,13 @@ CAPABILITIES = (
         ),
     }, within="mass of a wall"),
     Capability("opening", _of_walls("openings", ()), {
-        (SOFT_BODIES, PAPER_BODIES): _with_method("openings", "left out", "count"),
-        (BASELINE,): _with_method("openings", "left out", "count"),
+        (BASELINE, SOFT_BODIES, PAPER_BODIES): _with_method("openings", "left out", "count"),
     }),
     Capability("opening for a time", _where(lambda asked: asked.scene.has_doors()), {
         (CHORDS,): _CHANGES,
     }, within="opening"),
     Capability("present", _of_walls("present", None), {
-        (SOFT_BODIES, PAPER_BODIES): _with_method("present", "None"),
-        (BASELINE,): _with_method("present", "None"),
+        (BASELINE, SOFT_BODIES, PAPER_BODIES): _with_method("present", "None"),
         (CHORDS,): _CHANGES,
     }),
     Capability("motion", _of_walls("motion", None), {

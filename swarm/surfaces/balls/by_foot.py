@@ -20,9 +20,10 @@ from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON, TINY
 from ...kernel.vector import ZERO, Symmetric, Vec, dot, norm, square, total
 from .. import contract
+from ..curvature import applied, inverse
 from ..time_of_impact.course import rise_time
 from .at_radius import AtRadius
-from .foot_hit import applied, first_impact, inverse, matrix
+from .foot_hit import first_impact, matrix
 
 # Newton's steps to a foot; near it each one doubles the digits. The last one is shorter than this part of the distance.
 _SWEEPS, _LAST = 24, 1e-8

@@ -6,9 +6,9 @@ signed distance. t is found from below by Newton's method for 1/|x/a| = 1, which
 
 import math
 
-from ...kernel.jit import kernel, outlined, select
+from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
-from ...kernel.vector import Symmetric, Vec, column, dot, largest, norm, square, times
+from ...kernel.vector import Symmetric, Vec, dot, largest, norm, square, times
 from ..shapes.quadratic import ConvexQuadric
 from ..time_of_impact.course import rise_time_inside
 from .at_radius import AtRadius
@@ -23,6 +23,40 @@ _POLE = 1e-30
 _PART = 0.5
 
 
+@outlined
+def _foot(egg, r):
+    """The signed distance of a point outside of the ellipsoid, and the unit normal of that at its foot."""
+    y, a2 = r - egg.center, egg.squares
+    least = min(a2.x, min(a2.y, a2.z))
+    size = times(a2, times(y, y))
+    # Each of the terms of |x/a|^2 is 1 at most.
+    t = max(math.sqrt(size.x) - a2.x, max(math.sqrt(size.y) - a2.y, math.sqrt(size.z) - a2.z))
+    whole = 0.0
+    for _sweep in range(_SWEEPS):
+        x, z = _part(t, a2.x), _part(t, a2.z)
+        w = _part(t, a2.y)
+        s = size.x * x * x + size.y * w * w + size.z * z * z
+        slope = size.x * x * x * x + size.y * w * w * w + size.z * z * z * z
+        whole = s
+        step = s * (math.sqrt(s) - 1.0) / select(slope > 0.0, slope, 1.0)
+        after = t + step
+        if not after > t:
+            break
+        t = after
+    u = Vec(y.x * _part(t, a2.x), y.y * _part(t, a2.y), y.z * _part(t, a2.z))
+    length = norm(u)
+    # On the middle of the shortest axis, deep inside, x is beside it on both sides.
+    deep = (t + least <= 4.0 * EPSILON * least) & (whole < 1.0)
+    depth = -math.sqrt(t * t * square(u) + least * select(deep, 1.0 - whole, 0.0))
+    return select(deep, depth, t * length), u * (1.0 / select(length > 0.0, length, 1.0))
+
+
+def _part(t, a2):
+    """1/(t + a^2)"""
+    bottom = t + a2
+    return 1.0 / select(bottom > _POLE * a2, bottom, _POLE * a2)
+
+
 class EggCavity(AtRadius):
     """What is so far inside of an ellipsoid, in its principal frame: convex as that is, so that it is left once."""
 
@@ -34,9 +68,7 @@ class EggCavity(AtRadius):
     side = 1.0
     leaves_once = True
 
-    def foot(self, r):
-        """The signed distance of a point outside of the ellipsoid, and the unit normal of that at its foot."""
-        return _foot(self, r)
+    foot = _foot
 
     def phi(self, r):
         return self.foot(r)[0] + self.radius
@@ -99,41 +131,7 @@ class EggSolid(Rounded):
     squares: Vec
     radius: float
 
-    def foot(self, r):
-        return _foot(self, r)
-
-
-@outlined
-def _foot(egg, r):
-    y, a2 = r - egg.center, egg.squares
-    least = min(a2.x, min(a2.y, a2.z))
-    size = times(a2, times(y, y))
-    # Each of the terms of |x/a|^2 is 1 at most.
-    t = max(math.sqrt(size.x) - a2.x, max(math.sqrt(size.y) - a2.y, math.sqrt(size.z) - a2.z))
-    whole = 0.0
-    for _sweep in range(_SWEEPS):
-        x, z = _part(t, a2.x), _part(t, a2.z)
-        w = _part(t, a2.y)
-        s = size.x * x * x + size.y * w * w + size.z * z * z
-        slope = size.x * x * x * x + size.y * w * w * w + size.z * z * z * z
-        whole = s
-        step = s * (math.sqrt(s) - 1.0) / select(slope > 0.0, slope, 1.0)
-        after = t + step
-        if not after > t:
-            break
-        t = after
-    u = Vec(y.x * _part(t, a2.x), y.y * _part(t, a2.y), y.z * _part(t, a2.z))
-    length = norm(u)
-    # On the middle of the shortest axis, deep inside, x is beside it on both sides.
-    deep = (t + least <= 4.0 * EPSILON * least) & (whole < 1.0)
-    depth = -math.sqrt(t * t * square(u) + least * select(deep, 1.0 - whole, 0.0))
-    return select(deep, depth, t * length), u * (1.0 / select(length > 0.0, length, 1.0))
-
-
-def _part(t, a2):
-    """1/(t + a^2)"""
-    bottom = t + a2
-    return 1.0 / select(bottom > _POLE * a2, bottom, _POLE * a2)
+    foot = _foot
 
 
 @outlined
@@ -154,10 +152,3 @@ def _leaving(egg, r, v):
             break
         t = before
     return select(t > 0.0, t, 0.0)
-
-
-@kernel
-def distances_from(wall, points, found):
-    """How far points (3, N) are outside of a wall, into `found`."""
-    for i in range(points.shape[1]):
-        found[i] = wall.distance(column(points, 0, i))

@@ -2,8 +2,14 @@
 
 import math
 
+import numpy as np
+
+from ...kernel.arrays import aligned_copy
 from ...kernel.jit import select
 from ...kernel.vector import Vec, cross, dot, either, norm, square
+from ...state import Floats
+from ..fields.many import field_of
+from ..fields.members import Members
 from .rounded import Rounded, part_within
 
 # A flight through the edge between two triangles is through one of them: by this part each is larger then.
@@ -48,3 +54,12 @@ class RoundTriangle(Rounded):
         u, v = dot(cross(p, b), n), dot(cross(a, p), n)
         within = (u >= -_SEAM * n2) & (v >= -_SEAM * n2) & (n2 - u - v >= -_SEAM * n2)
         return select(changes & within, abs(after) / select(n2 > 0.0, math.sqrt(n2), 1.0), -1.0)
+
+
+def triangles_of_balls(corners: Floats, largest: float) -> Members:
+    """The triangles with these corners (T, 3, 3) as balls meet them, with radii of at most the largest one [m]."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    table = aligned_copy(np.concatenate([a, b - a, c - a, np.zeros((len(a), 1))], axis=1))
+    zero = Vec(0.0, 0.0, 0.0)
+    low, high = (np.ascontiguousarray(end(corners, axis=1).T) for end in (np.min, np.max))
+    return field_of(RoundTriangle(zero, zero, zero, 0.0), table, lambda: (low, high), None, largest)

@@ -17,6 +17,7 @@ from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON, TINY
 from ...kernel.record import Record
 from ...kernel.vector import Symmetric, Vec, absolute, dot, norm, square, total
+from ..curvature import applied, inverse
 from ..time_of_impact import march
 from ..time_of_impact.course import Fall, Quartic, close, first_rise, rise_time
 
@@ -167,26 +168,7 @@ def _impact(wall, flight, t, z):
     return TouchOfWall(max(time, 0.0), Sure(z, f, n, math.sqrt(select(left > 0.0, left, 0.0))), speed)
 
 
-# --- Matrices --------------------------------------------------------------------------------------------
-
-
 def matrix(wall, z, share):
     """I - k grad grad f"""
     h, k = wall.body.hessian(z), -2.0 * share * wall.side_of_body()
     return Symmetric(1.0 + k * h.xx, 1.0 + k * h.yy, 1.0 + k * h.zz, k * h.xy, k * h.yz, k * h.zx)
-
-
-def inverse(a):
-    """The inverse of a symmetric matrix."""
-    x, y, z = a.yy * a.zz - a.yz * a.yz, a.xx * a.zz - a.zx * a.zx, a.xx * a.yy - a.xy * a.xy
-    xy, yz, zx = a.yz * a.zx - a.xy * a.zz, a.xy * a.zx - a.yz * a.xx, a.xy * a.yz - a.zx * a.yy
-    whole = a.xx * x + a.xy * xy + a.zx * zx
-    f = 1.0 / select(abs(whole) > TINY, whole, 1.0)
-    return Symmetric(f * x, f * y, f * z, f * xy, f * yz, f * zx)
-
-
-def applied(a, v):
-    """A symmetric matrix times a vector."""
-    return Vec(
-        a.xx * v.x + a.xy * v.y + a.zx * v.z, a.xy * v.x + a.yy * v.y + a.yz * v.z, a.zx * v.x + a.yz * v.y + a.zz * v.z
-    )

@@ -1,6 +1,6 @@
 """The walls of a union of several rooms that balls meet, by the nearest place of their faces, edges and tips.
 
-A face is a wall of a room. It is *seen*, that is, there, at places that are in no other room. An edge is where walls
+A face is a wall of a room. Where it is in no other room it is a wall of the union, and *seen*. An edge is where walls
 of two rooms cross; balls turn about it. A tip is a place where walls of three rooms meet. The *foot* of a ball is the
 place of a face or an edge that is nearest to it. On an edge Newton's method finds it: each step goes to the place
 nearest to the ball on the line in both tangent planes. Faces that edges join are one wall; so are faces in one place.

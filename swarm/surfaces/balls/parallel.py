@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from ...common.checks import Vector
-from ...kernel.vector import Vec
+from ...kernel.jit import kernel
+from ...kernel.vector import Vec, column
 from ...state import Floats
 from ..surface import UNBOUNDED, Box, Surface, shown
 from .by_foot import ByFoot
-from .egg import distances_from
 
 # Points that are moved to where the surface is steepest least, their first step and the last one, in parts of its size.
 _STARTS, _FIRST, _SHORTEST, _SHORTER, _MOVES = 16, 0.05, 1e-6, 0.7, 3
@@ -60,13 +60,20 @@ def reach_by_distance(surface: Any, points: Floats, radius: Floats, time: float)
     return found + radius
 
 
+@kernel
+def distances_from(wall, points, found):
+    """How far points (3, N) are outside of a wall, into `found`."""
+    for i in range(points.shape[1]):
+        found[i] = wall.distance(column(points, 0, i))
+
+
 def foot_of(numbers: Any, most: float, bend: float, box: Box = UNBOUNDED, known: float = math.inf) -> ByFoot:
     """The wall of balls of these numbers: side H is at most so much up to twice `known` from it; it is in a box."""
     low, high = (Vec(*map(float, corner)) for corner in box)
     return ByFoot(numbers, 0.0, float(most), float(bend), low, high, float(known))
 
 
-def _nearer(points: Floats, value: Any, slope: Any) -> Floats:
+def nearer(points: Floats, value: Any, slope: Any) -> Floats:
     """Newton's step of points (3, N) onto a surface along the gradient."""
     normal = slope(points)
     with np.errstate(all="ignore"):
@@ -77,7 +84,7 @@ def onto(points: Floats, value: Any, slope: Any) -> Floats:
     """Points (3, N) moved onto a surface along the gradient; those that come to it near where they were."""
     size, to = np.ptp(points, axis=1).max(), points
     for _move in range(_ONTO):
-        to = _nearer(to, value, slope)
+        to = nearer(to, value, slope)
     with np.errstate(all="ignore"):
         found = np.abs(value(to)) <= _NEAR * size * np.sqrt((slope(to) ** 2).sum(axis=0))
     return to[:, found & (np.abs(to - points).max(axis=0) <= 0.1 * size)]
@@ -94,7 +101,7 @@ def tightest_of(points: Floats, value: Any, slope: Any, most: float) -> tuple[fl
     while step > _SHORTEST * float(np.abs(points).max()):
         trial = best + step * random.normal(size=best.shape)
         for _move in range(_MOVES):
-            trial = _nearer(trial, value, slope)
+            trial = nearer(trial, value, slope)
         there = np.sqrt((slope(trial) ** 2).sum(axis=0))
         less = (there < steep) & (np.abs(value(trial)) <= near)
         best, steep = np.where(less, trial, best), np.where(less, there, steep)

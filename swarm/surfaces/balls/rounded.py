@@ -6,18 +6,16 @@ is that to the nearest of its faces.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
 from ...kernel.gravity import Gravity, as_vector, displacement
 from ...kernel.jit import select
 from ...kernel.limits import PLACE, TINY
-from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot, norm, square, total
 from ..curvature import SPACING, half_hessian
-from ..time_of_impact.approach import place
-from ..time_of_impact.course import rise_time, under_way
+from ..time_of_impact.approach import Approach
+from ..time_of_impact.course import rise_time
 from ..time_of_impact.rising import plane_step
 from .at_radius import AtRadius
 
@@ -104,13 +102,8 @@ def foot_at(e, depth, face):
     return away + np.minimum(depth, 0.0), e * (1.0 / np.maximum(away, TINY)) + inside * face
 
 
-class ToBody(Record):
+class ToBody(Approach):
     """The steps of a flight to a grown body, each to a plane in front of it."""
-
-    surface: Any
-    gravity: Any
-    r: Vec
-    v: Vec
 
     # What is not found by then goes on in the next pass.
     most = 60
@@ -118,14 +111,12 @@ class ToBody(Record):
     def first_step(self):
         return self.next_step(0.0, math.inf)
 
-    def next_step(self, t, last):
-        p, w = place(self.gravity, self.r, self.v, t, last)
+    def step_from(self, p, w, last):
         time = self.surface.before(self.gravity, p, w)
         # The body is no farther behind the plane than the square of the way over the radius.
         way = total(absolute(displacement(self.gravity, w, select(time < math.inf, time, 0.0))))
         near = _CLOSE * self.surface.radius + PLACE * total(absolute(p))
-        goes_on = under_way(t, last)
-        return select(goes_on, t + time, t), select(goes_on, select(way <= near, 0.0, math.inf), last)
+        return time, select(way <= near, 0.0, math.inf)
 
 
 class RoundBox(Rounded):

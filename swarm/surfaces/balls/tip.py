@@ -20,9 +20,6 @@ class OfTip(Unturned):
 
     holds_balls = True
 
-    def flat_normal(self):
-        return self.body.flat_normal()
-
 
 class TipPlane(OfTip):
     """The plane through the tip, across the axis."""

@@ -10,7 +10,8 @@ from ...common.checks import path_of
 from ...common.extras import needed_by
 from ...errors import SceneError
 from ...state import Floats
-from ..facets import triangles
+from ..facets.mesh_files import Soup
+from ..facets.triangles import read_mesh
 from .sampled import Sampled
 from .thickness import require_resolved
 
@@ -66,7 +67,7 @@ def from_mesh(
     spacing, scale = checks.length("spacing", spacing), checks.length("scale", scale)
     if weld is not None:
         weld = checks.magnitude("weld", weld)
-    mesh = triangles.read_mesh(path_of("path", path), scale, weld)
+    mesh, moved = read_mesh(path_of("path", path), scale, weld)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     counts = np.ceil((high - low) / spacing) + 2.0 * _MARGIN + 1.0
     size = float(counts.prod()) * _SAMPLE
@@ -83,11 +84,11 @@ def from_mesh(
     parts = [_distance([axes[0][i : i + layers], *axes[1:]], mesh) for i in range(0, len(axes[0]), layers)]
     values = np.concatenate(parts)
     made = Sampled(values, spacing, tuple(origin.tolist()), side, mesh_error=0.0)
-    off, welded = _error(made, mesh), mesh.weld or None
+    off, welded = _error(made, mesh), moved or None
     return Sampled(values, spacing, made.origin, side, mesh_error=off, mesh_weld=welded, _made=made._made, **common)
 
 
-def _distance(axes: list[Floats], mesh: triangles.TriangleMesh) -> Floats:
+def _distance(axes: list[Floats], mesh: Soup) -> Floats:
     """The signed distance from the mesh on a grid."""
     with needed_by("from_mesh", "mesh"):
         import igl
@@ -98,7 +99,7 @@ def _distance(axes: list[Floats], mesh: triangles.TriangleMesh) -> Floats:
     return np.asarray(found).reshape([len(axis) for axis in axes])
 
 
-def _error(made: Sampled, mesh: triangles.TriangleMesh) -> float:
+def _error(made: Sampled, mesh: Soup) -> float:
     """The distance of the surface from the vertices, the middles of the edges and of the triangles of the mesh."""
     from scipy.spatial import KDTree
 

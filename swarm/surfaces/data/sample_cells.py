@@ -14,6 +14,7 @@ from ...kernel.jit import Array
 from ...kernel.limits import COEFFICIENT
 from ...kernel.record import Record
 from ...state import Floats
+from ..curvature import matrices_of
 
 Mask = NDArray[np.bool_]
 Places = NDArray[np.int64]
@@ -26,9 +27,8 @@ _BATCH = 16_384
 _FARTHEST = 63
 # The columns of `bends`: the entries of a matrix in the order of `Symmetric`, and how far H is from it at most.
 SPREAD, _COLUMNS = 6, 8
-# Of the entries of a symmetric matrix the two axes, and which of them are the matrix.
+# The two axes of each entry of a symmetric matrix.
 _SECOND = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
-_MATRIX = [0, 3, 5, 3, 1, 4, 5, 4, 2]
 
 
 # The clearance of a cell is kept in this part of the width of a cell.
@@ -140,7 +140,7 @@ def _rows(low: Floats, high: Floats, places: Places) -> NDArray[np.float32]:
     table = np.zeros((len(places), _COLUMNS), np.float32)
     table[:, :6] = 0.5 * (least + most)
     # |E| is at most the largest sum of a row.
-    off = np.maximum(most - table[:, :6], table[:, :6] - least)[:, _MATRIX].reshape(-1, 3, 3)
+    off = matrices_of(np.maximum(most - table[:, :6], table[:, :6] - least).T)
     table[:, SPREAD] = off.sum(axis=2).max(axis=1) * (1.0 + 1e-6)
     return table
 
@@ -148,7 +148,7 @@ def _rows(low: Floats, high: Floats, places: Places) -> NDArray[np.float32]:
 def eigenvalues(cells: SampleCells) -> tuple[float, float]:
     """The least and the largest eigenvalue of H where the surface is, at least and at most."""
     bends = cells.bends.astype(np.float64)
-    values, spread = np.linalg.eigvalsh(bends[:, _MATRIX].reshape(-1, 3, 3)), bends[:, SPREAD] * (1.0 + COEFFICIENT)
+    values, spread = np.linalg.eigvalsh(matrices_of(bends.T)), bends[:, SPREAD] * (1.0 + COEFFICIENT)
     return float((values[:, 0] - spread).min()), float((values[:, 2] + spread).max())
 
 
@@ -176,7 +176,7 @@ def most_bent_within(
 
 def _largest_bend(low: Floats, high: Floats, side: float) -> float:
     """The largest eigenvalue of side H at most, by bounds of its entries in cells; not below 0."""
-    middle, off = (part[_MATRIX].T.reshape(-1, 3, 3) for part in (0.5 * (low + high), 0.5 * (high - low)))
+    middle, off = map(matrices_of, (0.5 * (low + high), 0.5 * (high - low)))
     # |E| is at most the largest sum of a row.
     values = np.linalg.eigvalsh(side * middle)[:, 2] + off.sum(axis=2).max(axis=1)
     return float(values.max(initial=0.0)) * (1.0 + COEFFICIENT)

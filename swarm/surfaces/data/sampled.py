@@ -21,8 +21,8 @@ from ..balls.parallel import Parallel, foot_of, onto, tightest_of
 from ..surface import UNBOUNDED, Box, Surface, farthest, rotated_box, shown, side_sign
 from . import spline
 from .arrays import read_samples
-from .flight import SampledNumbers
 from .sample_cells import SampleCells, cells_of, eigenvalues, least_at_border, most_bent_within
+from .sampled_numbers import SampledNumbers
 from .spline import Spline
 
 # A spline that changes its sign between two samples of the same sign, by more than this part of what phi changes in a
@@ -98,11 +98,8 @@ class Sampled(Parallel):
     def __repr__(self) -> str:
         """The number of samples, and their place."""
         shape = " x ".join(map(str, self.values.shape))
-        parts = [f"<{shape}>", f"spacing={self.spacing}", f"origin={self.origin}"]
-        named = [one for one in fields(Surface) if getattr(self, one.name) != one.default]
-        own = [one for one in fields(self) if one.name in ("side", "mesh_error", "mesh_weld")]
-        written = [one for one in [*own, *named] if getattr(self, one.name) != one.default]
-        return f"Sampled({', '.join([*parts, *(f'{one.name}={getattr(self, one.name)!r}' for one in written)])})"
+        own = [one for one in fields(self) if one.name in ("spacing", "origin", "side", "mesh_error", "mesh_weld")]
+        return self._call([f"<{shape}>"], [*own, *fields(Surface)])
 
     # --- For kernels -------------------------------------------------------------------------------------
 

@@ -1,4 +1,9 @@
-"""A sampled surface as kernels take it: its level set, and what is known of its cells."""
+"""A sampled surface as kernels take it: its level set, what is known of its cells, and flights from cell to cell.
+
+Far from the surface a step goes as far as it surely does not reach it, or to the wall of the cell. Near it a step ends
+where a parabola above the level rises through 0, with the bounds of its bend in the cells around, or where it leaves
+these: no root is skipped.
+"""
 
 import math
 from typing import NamedTuple
@@ -11,12 +16,16 @@ from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import Symmetric, Vec, absolute, dot, lowest, norm, square, times, total
 from .. import contract
+from ..curvature import applied
 from ..time_of_impact.course import rise_time
+from ..time_of_impact.march import LOOKS, SafeStep, lets_go
 from .sample_cells import SPREAD, SampleCells
 from .spline import Spline
 
 # Cells without the surface that a straight flight comes through in one go.
 _MANY = 200
+# A flight that is past the wall by so many times the round-off of its place is at it.
+_ROUND_OFF = 8.0
 
 
 class SampleCell(NamedTuple):
@@ -26,6 +35,21 @@ class SampleCell(NamedTuple):
     row: int  # of what is known of the bend there
     clear: float  # how far from the surface at least [m], below 0 where it may be in the cell
     inside: bool
+
+
+class SlopeRange(NamedTuple):
+    """Bounds of half the second derivative of the level along a flight."""
+
+    least: float
+    most: float
+
+
+class LevelAndSlope(NamedTuple):
+    """The level, half of its slope along a flight, and the gradient of phi."""
+
+    level: float
+    half: float
+    slope: Vec
 
 
 def _is_in(u, count):
@@ -51,7 +75,7 @@ def _time_in(low, high, x, v, pull):
     return rise_time(high - x, -0.5 * v, -0.5 * pull) if x > high else 0.0
 
 
-def known(bends, i):
+def _known(bends, i):
     """The matrix A of a row of `bends`, and how far H is from it."""
     a = Symmetric(
         _at(bends, i, 0), _at(bends, i, 1), _at(bends, i, 2), _at(bends, i, 3), _at(bends, i, 4), _at(bends, i, 5)
@@ -68,13 +92,13 @@ def _inverse(x):
     return select(x != 0.0, 1.0 / select(x != 0.0, x, 1.0), math.inf)
 
 
-def least_of(a):
+def _least_of(a):
     """The least component."""
     return min(a.x, a.y, a.z)
 
 
-class CellNumbers(contract.Smooth):
-    """The numbers of a sampled surface, but for its flights."""
+class SampledNumbers(contract.Smooth):
+    """A sampled surface as kernels take it."""
 
     spline: Spline
     cells: SampleCells
@@ -180,18 +204,97 @@ class CellNumbers(contract.Smooth):
         u = times(r - self.spline.low, self.spline.inverse) - cell.low
         wall = lowest(Vec(1.0 + u.x, 1.0 + u.y, 1.0 + u.z), Vec(2.0 - u.x, 2.0 - u.y, 2.0 - u.z))
         # |A| is at most the root of the sum of the squares of its entries.
-        a, spread = known(self.cells.bends, cell.row)
+        a, spread = _known(self.cells.bends, cell.row)
         most = math.sqrt(square(Vec(a.xx, a.yy, a.zz)) + 2.0 * square(Vec(a.xy, a.yz, a.zx))) + spread
-        return most, most, least_of(times(wall, width))
+        return most, most, _least_of(times(wall, width))
 
     @outlined
     def clearance(self, r):
         """The distance to the surface at least; next to its cells, to the wall of the cell."""
         cell, width = self._cell_of(r), self.spline.width
         if not cell.inside:
-            return self.closed * max(norm(self.spline.place(r).off), MARGIN * least_of(width))
+            return self.closed * max(norm(self.spline.place(r).off), MARGIN * _least_of(width))
         if cell.clear < 0.0:
             return 0.0
         u = times(r - self.spline.low, self.spline.inverse) - cell.low
         wall = times(lowest(u, Vec(1.0 - u.x, 1.0 - u.y, 1.0 - u.z)), width)
-        return max(least_of(wall) + MARGIN * least_of(width), cell.clear)
+        return max(_least_of(wall) + MARGIN * _least_of(width), cell.clear)
+
+    # --- Flight ---
+
+    falling_looks = LOOKS
+
+    def look(self, r, v, pull, t, is_first):
+        g = norm(pull)
+        if g == 0.0:
+            if norm(v) == 0.0:
+                return SafeStep(t, math.inf, -1.0, -1.0)
+            t = self._through_empty(r, v, t)
+        p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
+        cell = self._cell_of(p)
+        if not cell.inside or cell.clear >= 0.0:
+            # Round-off must not leave it where it is for ever.
+            return SafeStep(t, max(self._free_time(cell, p, w, pull), EPSILON * t), -1.0, -1.0)
+        value, n = self.spline.value_and_slope(p)
+        level, half = self.side * value, 0.5 * self.side * dot(n, w)
+        speed, room = norm(w), 2.0 * EPSILON * total(self.spline.coordinates(p))
+        # Within round-off of the wall and not on its way off it: nothing nearer is to be found.
+        noise = _ROUND_OFF * room * norm(n)
+        if not is_first and half >= 0.0 and level >= -noise:
+            return SafeStep(t, 0.0, 0.0, select(level <= noise, -1.0, 0.0))
+        step, out, bent = self._safe_step(cell, LevelAndSlope(level, half, n), p, w, pull)
+        slack = room * norm(n)
+        if lets_go(level, half, step, slack):
+            step, _out, _bent_there = self._safe_step(cell, LevelAndSlope(-slack, half, n), p, w, pull)
+            return SafeStep(t, step, -1.0, -1.0)
+        # What is left of the level after the step is at most (most - least) step^2, and half of its slope there at
+        # least this.
+        rising, remaining = half + bent.least * step, (bent.most - bent.least) * step * step
+        arrives = speed * step + 0.5 * g * step * step <= room or remaining * (speed + g * step) <= 2.0 * room * rising
+        arrives = step < out and arrives and (not is_first or rising > 0.0 or step == 0.0)
+        return SafeStep(t, step, select(arrives, 0.0, -1.0), -1.0)
+
+    @outlined
+    def safe_time(self, r, v, pull):
+        """One safe step."""
+        if norm(v) == 0.0 and norm(pull) == 0.0:
+            return math.inf
+        cell = self._cell_of(r)
+        if cell.clear >= 0.0 or not cell.inside:
+            return self._free_time(cell, r, v, pull)
+        value, n = self.spline.value_and_slope(r)
+        level, half = self.side * value, 0.5 * self.side * dot(n, v)
+        if level > 0.0:
+            return 0.0
+        step, _out, _bent_there = self._safe_step(cell, LevelAndSlope(level, half, n), r, v, pull)
+        return step
+
+    def _safe_step(self, cell, here, r, v, pull):
+        """(a time for which a flight surely stays admissible, within which its bounds hold, these as `SlopeRange`)."""
+        # A short straight step stays in the cells around, which is cheaper to know than when it leaves them.
+        speed, falls = norm(v), norm(pull) > 0.0
+        out = _least_of(self.spline.width) / speed if speed > 0.0 else 0.0
+        bent = self._bent(cell.row, here.slope, v, pull, 0.0)
+        step = rise_time(here.level, here.half, bent.most)
+        if falls or not step < out:
+            out = self._until_out(cell.low, 1.0, r, v, pull)
+            bent = self._bent(cell.row, here.slope, v, pull, out)
+            step = min(rise_time(here.level, here.half, bent.most), out)
+        if falls and 2.0 * step < out:
+            # Again with the bounds of a shorter time
+            out = 2.0 * step
+            bent = self._bent(cell.row, here.slope, v, pull, out)
+            step = min(max(step, rise_time(here.level, here.half, bent.most)), out)
+        return step, out, bent
+
+    def _bent(self, row, n, v, pull, time):
+        """`SlopeRange` around a cell for so long, with the gradient and the velocity now."""
+        # w.H w + grad phi.G/2 with w = v + G t, grad phi = n + 2 H (v t + G t^2/2) and |H - A| at most the spread
+        a, spread = _known(self.cells.bends, row)
+        now, falls = dot(v, applied(a, v)) + 0.5 * dot(n, pull), norm(pull) * time
+        once, twice = 3.0 * dot(v, applied(a, pull)) * time, 1.5 * dot(pull, applied(a, pull)) * time * time
+        speed = norm(v) + falls
+        off = spread * speed * (speed + falls)
+        least, most = now + min(once, 0.0) + min(twice, 0.0) - off, now + max(once, 0.0) + max(twice, 0.0) + off
+        inside = self.side > 0.0
+        return SlopeRange(select(inside, least, -most), select(inside, most, -least))

@@ -24,7 +24,7 @@ from ...errors import SceneError
 from ...kernel.limits import TINY
 from ...state import Floats, Indices
 from ..facets.mending import components, neighbours
-from ..facets.triangles import TriangleMesh
+from ..facets.mesh_files import Soup
 from ..surface import shown
 
 # The thickness that is resolved, in spacings.
@@ -62,7 +62,7 @@ class _Thin(NamedTuple):
     gap: NDArray[np.bool_]  # of a gap, not of a wall
 
 
-def require_resolved(path: Path, mesh: TriangleMesh, spacing: float) -> None:
+def require_resolved(path: Path, mesh: Soup, spacing: float) -> None:
     """Raise a `SceneError` where a wall or a gap is too thin for samples this far apart [m]."""
     normals, areas = _normals(mesh)
     thin = _thin_places(mesh, normals, areas, spacing)
@@ -103,7 +103,7 @@ def _thinnest(thin: _Thin, surface: "_Surface", spacing: float) -> int | None:
 # --- Where it is thin ------------------------------------------------------------------------------------
 
 
-def _normals(mesh: TriangleMesh) -> tuple[Floats, Floats]:
+def _normals(mesh: Soup) -> tuple[Floats, Floats]:
     """The unit normals (T, 3) and the areas (T,) of the triangles."""
     a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
     normals = np.cross(b - a, c - a)
@@ -111,7 +111,7 @@ def _normals(mesh: TriangleMesh) -> tuple[Floats, Floats]:
     return normals / np.maximum(twice, TINY)[:, None], 0.5 * twice
 
 
-def _thin_places(mesh: TriangleMesh, normals: Floats, areas: Floats, spacing: float) -> _Thin:
+def _thin_places(mesh: Soup, normals: Floats, areas: Floats, spacing: float) -> _Thin:
     """The place where a ball that touches the mesh, as wide as a wall that is resolved, meets another side of it."""
     counts = np.maximum(np.ceil(_DENSITY * areas / spacing**2), 1.0).astype(np.int64)
     at = np.repeat(np.arange(len(areas)), counts)
@@ -136,7 +136,7 @@ def _thin_places(mesh: TriangleMesh, normals: Floats, areas: Floats, spacing: fl
 
 
 def _touching(
-    mesh: TriangleMesh, normals: Floats, at: Indices, points: Floats, toward: Floats, radius: Floats
+    mesh: Soup, normals: Floats, at: Indices, points: Floats, toward: Floats, radius: Floats
 ) -> tuple[NDArray[np.bool_], Floats, Floats, Indices]:
     """Whether balls that touch the mesh in points of these triangles meet a side that faces them.
 
@@ -161,7 +161,7 @@ def _touching(
 class _Surface:
     """The mesh with its edges."""
 
-    def __init__(self, mesh: TriangleMesh, normals: Floats, spacing: float) -> None:
+    def __init__(self, mesh: Soup, normals: Floats, spacing: float) -> None:
         from scipy.spatial import KDTree
 
         self.mesh, self.normals = mesh, normals

@@ -14,12 +14,13 @@ from .mending import parts_of
 
 # The sine of an angle between triangles that are in one plane, and how far from that corners may be, of the size.
 _FLAT, _OFF = 1e-5, 1e-6
-# So many planes a face has at the most: more take long to compare. By this part a hull is larger than what is convex.
+# A face has at most so many planes: more take long to compare. A part is convex if its hull is larger by no more than
+# this part of it.
 _MOST, _WIDER = 2000, 1e-5
 
 
 class _Groups:
-    """Sets of numbers that become one, as a forest."""
+    """Sets of numbers that are united step by step: a forest."""
 
     def __init__(self, count: int) -> None:
         self.parent = list(range(count))

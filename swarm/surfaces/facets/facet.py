@@ -18,7 +18,7 @@ ROOM = 2.0**-40
 # far above what a flight ends beside its wall by, and so far that the sides of a fold of 2 degrees meet. A step of a
 # slide ends behind a side by less than the third, so that it is never on the other side.
 THIN, OVERLAP, _BEHIND_SIDE = 32.0, 2048.0, 8.0
-# As deep behind a facet as this many times the round-off of places a step may end that has come through it.
+# A step that has come through a facet ends behind it by no more than this many times the round-off of places.
 _BEHIND = 1e4
 
 

@@ -22,9 +22,10 @@ from ...state import Floats
 from ..fields.grid import enter_bodies
 from .free_room import rows_of, spare_of
 
-# Of the width of a cell the square is so many times the mean area of a facet: a wider one has more facets, of finer
-# ones more are crossed. It doubles with ten times as many facets, from the first number of facets to the second: what
-# the processor's cache holds is crossed sooner. For each facet there are at most so many cells, of 5 bytes each.
+# The square of the width of a cell is so many times the mean area of a facet: in wider cells a flight looks at more
+# facets, and it crosses more of narrower ones. It doubles with ten times as many facets, from the first number of
+# facets to the second: cells that the processor's cache holds are crossed sooner. Each facet has at most so many cells,
+# of 5 bytes each.
 _AREA, _DOUBLES, _FEW, _MANY = 1.0, math.log10(2.0), 260.0, 1e5
 _CELLS_EACH, _MOST_CELLS = 32.0, 100_000_000
 # Cells of few facets.
@@ -54,7 +55,7 @@ _SOME = 60
 BLOCK = 8
 
 
-# A plane that hardly a flight comes through: far ahead of it, it is behind it.
+# A plane that hardly any flight comes through, as it faces away and is far ahead.
 _NO_PLANE = np.array([-32767, 0, 0, 0, 32767, 0, 0, 0], np.int16)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...state import Floats, Indices
-from .mending import sizes
+from .mending import edges_of, sizes
 
 # Digits to which triangles are in one plane, of a normal and of an offset in sizes of the mesh.
 DIGITS = 9
@@ -49,8 +49,7 @@ def all_in_a_plane(corners: Floats, triangles: Indices) -> bool:
 def rim_of(corners: Floats, triangles: Indices, plane: Floats, count: int) -> Floats:
     """Points (3, count) on the edges of what of a mesh is in a plane."""
     face = _within(corners, triangles, plane)
-    ends = np.sort(np.concatenate([face[:, [0, 1]], face[:, [1, 2]], face[:, [2, 0]]]), axis=1)
-    edges, counts = np.unique(ends, axis=0, return_counts=True)
+    edges, counts = edges_of(face)
     return _drawn(corners[edges[counts == 1]], count)
 
 

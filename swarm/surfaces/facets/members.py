@@ -1,20 +1,24 @@
 """The facets of a mesh as kernels take them: which is met first, and which are near."""
 
 import math
+from typing import Any
 
-from ...kernel.arrays import fetch, index
+import numpy as np
+
+from ...kernel.arrays import aligned_copy, fetch, index
 from ...kernel.gravity import accelerated, displacement
 from ...kernel.grid import cell_of, entries_at, entries_of, until_next, until_out
 from ...kernel.jit import outlined, select
 from ...kernel.vector import cross, dot, square
+from ...state import Floats
 from ..fields.members import Members, member
 from ..presence.patched import Patched
 from ..shapes.plane import PlaneNumbers
 from ..time_of_impact import flights
-from .facet import ROOM, Shared
+from .facet import ROOM, THIN, Shared
 from .facet_cells import BLOCK, blocks_of, flight_in, from_middle, passes
-from .free_room import FREE, FULL, KIND, room_of, without_entries
-from .nearest import foot_on
+from .free_room import CLOSED, FREE, FULL, KIND, room_of, with_blocks, with_cones, without_entries
+from .nearest import foot_on, nearest
 
 # So many cells and blocks of cells are crossed before a flight is said to be free so far.
 _MOST = 4000
@@ -216,3 +220,59 @@ def _passes(cells, number, k, here):
     """Whether a flight may meet the facet of an entry of the cell with this number."""
     begin, _end = blocks_of(cells, number)
     return passes(cells, index(begin + k // BLOCK), index(k % BLOCK), here)
+
+
+# --- From a description ----------------------------------------------------------------------------------
+
+
+def table_of_facets(corners: Floats) -> Floats:
+    """The normals and the offsets of facets with these corners (T, 3, 3), one in each row."""
+    normal = _normals(*np.moveaxis(corners, 1, 0))
+    return aligned_copy(np.concatenate([normal, (normal * corners.mean(axis=1)).sum(axis=1)[:, None]], axis=1))
+
+
+def table_of_sides(corners: Floats, room: float) -> Floats:
+    """The numbers of both sides of sheets with these corners (T, 3, 3), side by side; `room` is round-off [m]."""
+    table = aligned_copy(np.repeat(table_of_facets(corners), 2, axis=0))
+    table[1::2] *= -1.0
+    table[:, 3] -= THIN * room
+    return table
+
+
+def _normals(a: Floats, b: Floats, c: Floats) -> Floats:
+    """Unit normals of triangles, from the two shorter sides."""
+    sides = np.stack([b - a, c - b, a - c])
+    longest = (sides**2).sum(axis=2).argmax(axis=0)
+    every = np.arange(len(a))
+    found = np.cross(sides[(longest + 1) % 3, every], sides[(longest + 2) % 3, every])
+    return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
+
+
+def with_room(facets: Facets, mesh: Any, is_solid: bool) -> Facets:
+    """The facets with what is free around each cell; with no `mesh` all that is empty is."""
+    from scipy.ndimage import label
+
+    grid = facets.grid
+    shape = tuple(int(n) for n in grid.shape)
+    held = np.diff(grid.first[:-1]).reshape(shape) > 0
+    rows = grid.known.room
+    with_cones(rows, facets.table[:, :3], grid.entries, grid.first)
+    parts, count = label(~held)
+    if mesh is None:
+        with_blocks(rows, held)
+    elif count:
+        # The middle of one cell of each part says on which side it is.
+        labels, first = np.unique(parts.ravel(), return_index=True)
+        first, labels = first[labels > 0], labels[labels > 0]
+        places = np.array(np.unravel_index(first, shape), np.float64)
+        low, width = (np.array(row)[:, None] for row in (grid.low, grid.width))
+        found = np.empty((4, len(labels)))
+        nearest(facets, mesh, np.ascontiguousarray(low + (places + 0.5) * width), found)
+        sides = np.full(count + 1, CLOSED, np.int8)
+        sides[labels] = np.where(found[3] < 0.0, FREE, CLOSED)
+        rows[:-1, KIND] = np.where(held, rows[:-1, KIND].reshape(shape), sides[parts]).ravel()
+        with_blocks(rows, held)
+    rows[-1, KIND] = FREE if is_solid else CLOSED
+    if mesh is None:
+        return facets
+    return facets._replace(grid=grid._replace(known=grid.known._replace(boxes=mesh[2])))

@@ -22,6 +22,7 @@ from ...kernel.vector import Vec
 from ...state import Floats, Indices
 from .. import rotation as rotations
 from ..area_samples import AreaSample, Region, of_triangles
+from ..balls.facet import triangles_of_balls
 from ..fields.members import Members
 from ..fields.one_wall import OneWall, one_wall
 from ..surface import LAWS, UNBOUNDED, Box, Surface, side_sign
@@ -29,12 +30,11 @@ from .faces import faces_of
 from .facet import OVERLAP, ROOM, THIN, CornersOf, CornersOfSides, FacetNumbers, Shared, SheetSide
 from .facet_cells import MOVING_MARGIN, cells_around
 from .flat import all_in_a_plane, in_plane, places_of, planes_of, rim_of
-from .made import given_arrays, sorted_by_place, table_of_facets, table_of_sides, triangles_of_balls, with_room
-from .members import Facets
+from .members import Facets, table_of_facets, table_of_sides, with_room
 from .mending import sizes
-from .mesh_files import read_soup
+from .mesh_files import given_arrays, read_soup
 from .nearest import boxes_of, nearest, within
-from .triangles import closed, sheets
+from .triangles import closed, sheets, sorted_by_place
 
 _NOUNS_OF_SHEETS = ("open mesh",) * 4
 # What a group may have of its own.
@@ -141,11 +141,12 @@ class Mesh(Surface):
             soup = given_arrays(self.vertices, self.triangles, self.group, self.names, self.scale)
         # What is in a plane encloses nothing, so that it cannot be a closed mesh that is damaged.
         is_open = self.open or all_in_a_plane(soup.vertices, soup.triangles)
-        mesh = sorted_by_place((sheets if is_open else closed)(path, soup, self.weld))
+        soup, moved = (sheets if is_open else closed)(path, soup, self.weld)
+        mesh = sorted_by_place(soup)
         for values in (mesh.vertices, mesh.triangles, mesh.group):
             values.flags.writeable = False
         own = {name: getattr(mesh, name) for name in ("vertices", "triangles", "group", "names")}
-        settled = {"scale": 1.0, "weld": None, "mesh_weld": mesh.weld or self.mesh_weld or None, "open": is_open}
+        settled = {"scale": 1.0, "weld": None, "mesh_weld": moved or self.mesh_weld or None, "open": is_open}
         checks.assign(self, **own, **settled, _mended=tuple(own.values()))
 
     def _checked_groups(self) -> dict[str, dict[str, Any]] | None:
@@ -170,11 +171,7 @@ class Mesh(Surface):
     def __repr__(self) -> str:
         """The number of triangles, and what is not a default."""
         own = ("open" if self.open else "side", "center", "groups", "mesh_weld", *(one.name for one in fields(Surface)))
-        changed = [one for one in fields(self) if one.name in own and getattr(self, one.name) != one.default]
-        return (
-            ", ".join([f"Mesh(<{len(self)} triangles>", *(f"{f.name}={getattr(self, f.name)!r}" for f in changed)])
-            + ")"
-        )
+        return self._call([f"<{len(self)} triangles>"], [one for one in fields(self) if one.name in own])
 
     # --- For kernels -------------------------------------------------------------------------------------
 
@@ -231,7 +228,7 @@ class Mesh(Surface):
         return (made[largest],)
 
     def faces_of_balls(self, largest: float) -> tuple[Members, Indices]:
-        """As `Many.faces_of_balls`: triangles in one plane, and those of a convex body."""
+        """As `ManyBodies.faces_of_balls`: triangles in one plane, and those of a convex body."""
         corners, face = faces_of(self.corners, self.triangles, 0.0 if self.open else -side_sign(self.side))
         return triangles_of_balls(corners, largest), face
 

@@ -1,4 +1,4 @@
-"""The triangles of a file as they are there, with the names of its solids, objects or groups."""
+"""The triangles of a file, or of arrays, as they are there, with the names of solids, objects or groups."""
 
 import itertools
 import re
@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...common import checks
 from ...common.extras import needed_by
 from ...errors import SceneError
 from ...state import Floats, Indices
@@ -188,3 +190,45 @@ def _values_of(mesh: Any, count: int) -> Any:
         names = tuple(data)
     values = np.ravel(data["group"]) if "group" in names else None
     return values if values is not None and len(values) == count else None
+
+
+# --- Arrays ----------------------------------------------------------------------------------------------
+
+
+def given_arrays(vertices: Any, triangles: Any, group: Any, names: Any, scale: float) -> Soup:
+    """The arguments that are arrays, checked."""
+    if triangles is None:
+        raise SceneError("triangles must be (T, 3) numbers of corners, got None; or give the path of a file alone")
+    corners = checks.array("vertices", vertices)
+    if corners.ndim != 2 or corners.shape[1] != 3 or not np.isfinite(corners).all():
+        raise SceneError(
+            f"vertices must be (V, 3) finite numbers, got shape {corners.shape}; or give the path of a file"
+        )
+    cells = _whole("triangles", triangles)
+    if cells.ndim != 2 or cells.shape[1] != 3 or not len(cells) or cells.dtype.kind not in "iu":
+        raise SceneError(f"triangles must be (T, 3) whole numbers, got shape {cells.shape} of {cells.dtype}")
+    if cells.min() < 0 or cells.max() >= len(corners):
+        wrong = int(np.argwhere((cells < 0) | (cells >= len(corners)))[0, 0])
+        raise SceneError(
+            f"triangles must be numbers from 0 to {len(corners) - 1}, of which each is a corner, got "
+            f"{cells[wrong].tolist()} in row {wrong}"
+        )
+    of = np.zeros(len(cells), np.int64) if group is None else _whole("group", group).astype(np.int64)
+    known = tuple(map(str, names)) or tuple(map(str, range(int(of.max()) + 1))) if group is not None else ("",)
+    if of.shape != (len(cells),) or of.min() < 0 or of.max() >= len(known):
+        raise SceneError(
+            f"group must be (T,) numbers of {len(known)} names, one for each of the {len(cells)} triangles, got shape "
+            f"{of.shape} from {of.min()} to {of.max()}"
+        )
+    return Soup(scale * corners, cells.astype(np.int64), of, known)
+
+
+def _whole(name: str, values: Any) -> NDArray[Any]:
+    """An argument as an array of whole numbers, at least one."""
+    try:
+        found = np.asarray(values)
+    except Exception:  # rows of different lengths, or an object of others
+        found = np.empty(0)
+    if found.dtype.kind not in "iu" or not found.size:
+        raise SceneError(f"{name} must be whole numbers, one or more, got {checks.shown(values)}")
+    return found

@@ -1,7 +1,7 @@
-"""A mesh of triangles from a file: read, its corners joined, its parts turned if it is closed, or refused."""
+"""A mesh of triangles: its corners joined, its parts turned if it is closed, or refused, and its triangles sorted."""
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -16,28 +16,14 @@ from .mesh_files import Soup, read_soup
 _LOOKED_UP = 16
 # So many holes are listed.
 _LISTED = 5
+# Bits of a place along each axis, by which triangles are sorted.
+_BITS = 20
 
 
-class TriangleMesh(NamedTuple):
-    """Triangles that enclose a volume, or sheets.
+def read_mesh(path: Path, scale: float, weld: float | None) -> tuple[Soup, float]:
+    """The mesh in a file, and how far a corner was moved at most to close seams [m].
 
-    Attributes:
-        vertices: (V, 3) [m].
-        triangles: (T, 3) their corners, counter-clockwise seen from outside if they enclose a volume.
-        weld: how far a corner was moved at most to close seams [m].
-        group: (T,) the number of the group of each triangle.
-        names: of the groups.
-    """
-
-    vertices: Floats
-    triangles: Indices
-    weld: float
-    group: Indices
-    names: tuple[str, ...]
-
-
-def read_mesh(path: Path, scale: float, weld: float | None) -> TriangleMesh:
-    """The mesh in a file.
+    Its triangles enclose a volume; seen from outside their corners are counter-clockwise.
 
     Args:
         path: of the file.
@@ -51,8 +37,8 @@ def read_mesh(path: Path, scale: float, weld: float | None) -> TriangleMesh:
     return closed(path, read_soup(path, scale), weld)
 
 
-def closed(path: Path, soup: Soup, weld: float | None) -> TriangleMesh:
-    """The mesh that triangles make; see `read_mesh`."""
+def closed(path: Path, soup: Soup, weld: float | None) -> tuple[Soup, float]:
+    """The mesh that triangles make, as `read_mesh` returns it."""
     soup, moved, within = seams_closed(joined(soup), weld)
     edges, counts = edges_of(soup.triangles)
     if not len(soup.triangles) or (counts != 2).any():
@@ -68,10 +54,10 @@ def closed(path: Path, soup: Soup, weld: float | None) -> TriangleMesh:
             f"a Klein bottle: neighbours are not at {len(wrong)} edges, one at "
             f"{shown(soup.vertices[wrong[0]].mean(axis=0))}; mend it, for example with MeshLab"
         )
-    return _of_used(_outward(path, soup), moved)
+    return _of_used(_outward(path, soup)), moved
 
 
-def sheets(path: Path, soup: Soup, weld: float | None) -> TriangleMesh:
+def sheets(path: Path, soup: Soup, weld: float | None) -> tuple[Soup, float]:
     """The sheets that triangles make, each triangle once; their corners are joined as those of a closed mesh are."""
     soup, moved, _within = seams_closed(joined(soup), weld)
     _corners, first = np.unique(np.sort(soup.triangles, axis=1), axis=0, return_index=True)
@@ -79,13 +65,13 @@ def sheets(path: Path, soup: Soup, weld: float | None) -> TriangleMesh:
     kept = kept[have_area(soup.vertices, soup.triangles[kept])]
     if not len(kept):
         raise SceneError(f"the mesh {path} must hold triangles that have an area, got none")
-    return _of_used(soup.of(soup.triangles[kept], kept), moved)
+    return _of_used(soup.of(soup.triangles[kept], kept)), moved
 
 
-def _of_used(soup: Soup, moved: float) -> TriangleMesh:
+def _of_used(soup: Soup) -> Soup:
     """The triangles with the corners that they use."""
     used, turned = np.unique(soup.triangles, return_inverse=True)
-    return TriangleMesh(soup.vertices[used], turned.reshape(-1, 3), moved, soup.group, soup.names)
+    return soup._replace(vertices=soup.vertices[used], triangles=turned.reshape(-1, 3))
 
 
 # --- Whether it is closed --------------------------------------------------------------------------------
@@ -156,3 +142,21 @@ def _is_within(path: Path, points: Floats, vertices: Floats, part: Indices) -> b
             "trimesh.boolean.union"
         )
     return bool(inside.any())
+
+
+# --- In which order they are -----------------------------------------------------------------------------
+
+
+def sorted_by_place(mesh: Soup) -> Soup:
+    """The triangles by their groups, those near to each other near: what a cell holds is in few lines of the cache."""
+    middles = mesh.vertices[mesh.triangles].mean(axis=1)
+    low, wide = middles.min(axis=0), float(np.ptp(middles, axis=0).max()) or 1.0
+    places = ((middles - low) * ((2**_BITS - 1) / wide)).astype(np.int64)
+    keys = np.zeros(len(places), np.int64)
+    for bit in range(_BITS):
+        for axis in range(3):
+            keys |= (places[:, axis] >> bit & 1) << (3 * bit + axis)
+    order = np.lexsort((keys, mesh.group))
+    triangles: Any = np.ascontiguousarray(mesh.triangles[order], np.int32)
+    group: Any = mesh.group[order].astype(np.int32)
+    return mesh._replace(triangles=triangles, group=group)

@@ -16,7 +16,7 @@ from ..shapes.ellipsoid import Ellipsoid
 from ..shapes.sphere import Sphere, ball, cavity
 from ..surface import Surface
 from .foam import Foam
-from .many import Many, field_of
+from .many import ManyBodies, field_of
 from .members import Members
 
 # Points of a circle in a plane.
@@ -24,7 +24,7 @@ _CIRCLE = 97
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Spheres(Many):
+class Spheres(ManyBodies):
     """Many balls, one surface: the space outside of all of them, or a foam of cavities.
 
     Solid ones may overlap one another, and reach through other walls. With side="inside" particles are in any of them,
@@ -74,7 +74,6 @@ class Spheres(Many):
 
     @cached_property
     def members(self) -> Members:
-        """The field as kernels take it."""
         field = self._field(None)
         return field if self.is_solid() else Foam(*field)
 
@@ -97,7 +96,7 @@ class Spheres(Many):
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Cylinders(Many):
+class Cylinders(ManyBodies):
     """Many solid cylinders, endless or capped, one surface; the space outside of all of them.
 
     They may overlap one another, and reach through other walls.
@@ -138,7 +137,7 @@ class Cylinders(Many):
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Capsules(Many):
+class Capsules(ManyBodies):
     """Many solid capsules, one surface; the space outside of all of them.
 
     They may overlap one another, and reach through other walls.
@@ -175,7 +174,7 @@ class Capsules(Many):
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Boxes(Many):
+class Boxes(ManyBodies):
     """Many solid boxes, one surface; the space outside of all of them.
 
     They may overlap one another, and reach through other walls.
@@ -213,7 +212,7 @@ class Boxes(Many):
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Ellipsoids(Many):
+class Ellipsoids(ManyBodies):
     """Many solid ellipsoids, one surface; the space outside of all of them.
 
     They may overlap one another, and reach through other walls.

@@ -55,9 +55,50 @@ _SIZES = "radii", "lengths", "half_widths", "semi_axes"
 
 
 class Many(Surface):
-    """Solid bodies of one kind; particles live outside of all of them. They may overlap."""
+    """Many walls of one kind, which kernels take as one field: of bodies, or on the sides of an outline."""
 
     is_field = True
+
+    def __len__(self) -> int:
+        raise NotImplementedError
+
+    @property
+    def members(self) -> Members:
+        """The walls as kernels take them."""
+        raise NotImplementedError
+
+    def _members_of_balls(self, largest: float) -> Members:
+        raise NotImplementedError
+
+    def corners(self) -> tuple[Floats, Floats]:
+        """The bounds of every body, its lowest and its highest corner (3, n), infinite where it has no end."""
+        raise NotImplementedError
+
+    def numbers(self) -> list[int]:
+        """The number of every body, or side."""
+        return list(range(len(self)))
+
+    def wall_count(self, of_balls: bool) -> int:
+        return len(self)
+
+    def walls(self) -> tuple[Any]:
+        return (OneWall(self.members.in_cells(), None) if self.is_one_wall else self.members,)
+
+    def as_one_wall(self) -> Surface:
+        return one_wall(self)
+
+    def walls_of_balls(self, largest: float) -> tuple[Members]:
+        made: dict[float, Members] = self.__dict__.setdefault("_of_balls", {})
+        # The cells of larger balls are as right.
+        largest = min((one for one in made if one >= largest), default=largest)
+        if largest not in made:
+            made[largest] = self._members_of_balls(largest)
+        return (made[largest],)
+
+
+class ManyBodies(Many):
+    """Solid bodies of one kind; particles live outside of all of them. They may overlap."""
+
     centers: Any
     # Of one body
     kind: ClassVar[type[Surface]]
@@ -105,11 +146,7 @@ class Many(Surface):
 
     def __repr__(self) -> str:
         """Their kind and number, and the laws of their wall."""
-        laws = [f for f in fields(self) if f.kw_only and getattr(self, f.name) != f.default]
-        return (
-            ", ".join([f"{type(self).__name__}(<{len(self)}>", *(f"{f.name}={getattr(self, f.name)!r}" for f in laws)])
-            + ")"
-        )
+        return self._call([f"<{len(self)}>"], [one for one in fields(self) if one.kw_only])
 
     @classmethod
     def columns(cls) -> dict[str, tuple[str, ...]]:
@@ -130,13 +167,9 @@ class Many(Surface):
         return [self.kind(**dict(zip(given, row, strict=True)), side="outside") for row in rows]  # type: ignore[call-arg]
 
     def corners(self) -> tuple[Floats, Floats]:
-        """The bounds of every body, its lowest and its highest corner (3, n), infinite where it has no end."""
         return _corners_of(self.solids())
 
     def body_count(self) -> int:
-        return len(self)
-
-    def wall_count(self, of_balls: bool) -> int:
         return len(self)
 
     @once
@@ -152,7 +185,7 @@ class Many(Surface):
 
     def images(
         self, which: NDArray[np.int64], centers: Floats, repeated: tuple[Floats, Floats] | None = None
-    ) -> "Many":
+    ) -> "ManyBodies":
         """A field of these bodies, at other places, for a cell with these corners that repeats."""
         given = {field.name: getattr(self, field.name) for field in fields(self)}
         taken: dict[str, Any] = {name: value[which] for name, value in given.items() if isinstance(value, np.ndarray)}
@@ -161,7 +194,7 @@ class Many(Surface):
         object.__setattr__(made, "which", which)
         return made
 
-    def with_bodies(self, bodies: dict[int, Surface]) -> "Many":
+    def with_bodies(self, bodies: dict[int, Surface]) -> "ManyBodies":
         """The field with other places and sizes of the bodies in some rows."""
         made = {
             name: getattr(self, name).copy() for name in ("centers", *_SIZES) if getattr(self, name, None) is not None
@@ -173,26 +206,11 @@ class Many(Surface):
 
     def numbers(self) -> list[int]:
         """The number of every body; of an image that of the body it is of."""
-        return list(range(len(self))) if self.which is None else self.which.tolist()
+        return super().numbers() if self.which is None else self.which.tolist()
 
     @cached_property
-    def members(self) -> Members:
-        """The field as kernels take it."""
+    def members(self) -> Members:  # type: ignore[override]
         return members_of(self.solids(), self.repeated)
-
-    def walls(self) -> tuple[Any]:
-        return (OneWall(self.members.in_cells(), None) if self.is_one_wall else self.members,)
-
-    def as_one_wall(self) -> Surface:
-        return one_wall(self)
-
-    def walls_of_balls(self, largest: float) -> tuple[Members]:
-        made: dict[float, Members] = self.__dict__.setdefault("_of_balls", {})
-        # The cells of larger balls are as right.
-        largest = min((one for one in made if one >= largest), default=largest)
-        if largest not in made:
-            made[largest] = self._members_of_balls(largest)
-        return (made[largest],)
 
     def _members_of_balls(self, largest: float) -> Members:
         return members_of(self.solids(), self.repeated, largest)
@@ -292,5 +310,5 @@ def in_straight_flights(members: Members, repeats: bool) -> Members:
 
 def _corners_of(surfaces: Sequence[Surface]) -> tuple[Floats, Floats]:
     """The lowest and the highest corners of solids (3, n): those of their cavities."""
-    boxes = np.array([replace(surface, side="inside").bounds() for surface in surfaces])  # type: ignore[call-arg]
+    boxes = np.array([surface.enclosing_box() for surface in surfaces])
     return np.ascontiguousarray(boxes[:, 0].T), np.ascontiguousarray(boxes[:, 1].T)

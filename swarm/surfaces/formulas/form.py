@@ -17,8 +17,9 @@ from ...kernel.vector import Vec, vec
 from ...state import Floats
 from .. import rotation as rotations
 from ..balls.by_foot import ByFoot
-from ..balls.parallel import Parallel, foot_of, tightest_of
-from ..surface import UNBOUNDED, Box, farthest, rotated_box, shown, side_sign
+from ..balls.parallel import Parallel, foot_of, nearer, tightest_of
+from ..curvature import matrices_of
+from ..surface import UNBOUNDED, Box, farthest, rotated_box, shown, side_sign, slopes_of
 from .numbers import Bend
 
 # Central differences lose least at the cube root of round-off, relative to the length.
@@ -229,8 +230,7 @@ class Form:
     def slope(self, points: Floats) -> Floats:
         """Its gradient."""
         with np.errstate(all="ignore"):
-            parts = self.numbers((0.0, 0.0, 0.0)).gradient(vec(points))
-            return np.array(np.broadcast_arrays(*parts, points[0])[:3])
+            return slopes_of(self.numbers((0.0, 0.0, 0.0)), vec(points))
 
     def points(self, n: int) -> Floats:
         """Random points of the box, or around the center if the form has no box."""
@@ -353,8 +353,8 @@ class Form:
     def _sharpness(self, points: Floats, step: float) -> Floats:
         """The largest |second derivative| of phi in any direction at each point, by differences of the gradient."""
         entries = self._entries(points, step * np.eye(3)[:, :, None])
-        matrices = np.nan_to_num(entries, nan=0.0, posinf=0.0, neginf=0.0)[[0, 3, 5, 3, 1, 4, 5, 4, 2]]
-        return np.asarray(2.0 * np.abs(np.linalg.eigvalsh(matrices.T.reshape(-1, 3, 3))).max(axis=1))
+        matrices = matrices_of(np.nan_to_num(entries, nan=0.0, posinf=0.0, neginf=0.0))
+        return np.asarray(2.0 * np.abs(np.linalg.eigvalsh(matrices)).max(axis=1))
 
     def _entries(self, points: Floats, step: Floats) -> Floats:
         """The entries of side H, H = grad grad phi/2, at points by differences of the gradient, (6, N)."""
@@ -367,9 +367,7 @@ class Form:
         low, high = (np.array(UNBOUNDED) if self.box is None else np.array(self.box))[:, :, None]
         start = np.abs(self.value(points)).max()
         for _ in range(_MOVES):
-            slope = self.slope(points)
-            with np.errstate(all="ignore"):
-                points = points - self.value(points) / (slope**2).sum(axis=0) * slope
+            points = nearer(points, self.value, self.slope)
         inside = ((points >= low) & (points <= high)).all(axis=0)
         return points[:, inside & (np.abs(self.value(points)) <= 1e-6 * start)]
 

@@ -10,6 +10,7 @@ from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import Symmetric, Vec, absolute, dot, largest, square, total
 from .. import contract
+from ..curvature import matrices_of
 from ..time_of_impact.course import Majorant, positive
 from ..time_of_impact.looks import FallByLooks, FallToBox, Straight, falling, first_found
 
@@ -40,8 +41,7 @@ class Bend(NamedTuple):
     @classmethod
     def of_entries(cls, low: Any, high: Any) -> "Bend":
         """From bounds of the entries in each of many cells, (6, cells)."""
-        matrix = [0, 3, 5, 3, 1, 4, 5, 4, 2]
-        middle, radius = (part[matrix].T.reshape(-1, 3, 3) for part in (0.5 * (low + high), 0.5 * (high - low)))
+        middle, radius = map(matrices_of, (0.5 * (low + high), 0.5 * (high - low)))
         # |lambda(A + E) - lambda(A)| <= |E|, the largest sum of a row; and the round-off of lambda(A)
         values = np.linalg.eigvalsh(middle)
         room = radius.sum(axis=2).max(axis=1) + 64.0 * EPSILON * np.abs(values).max(axis=1)

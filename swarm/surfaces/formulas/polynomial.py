@@ -7,7 +7,7 @@ from ...kernel.gravity import Gravity, accelerated, as_vector, displacement, ris
 from ...kernel.jit import outlined, select
 from ...kernel.limits import EPSILON
 from ...kernel.vector import absolute, dot, norm, square, total
-from ..balls.foot_hit import applied
+from ..curvature import applied
 from ..time_of_impact.approach import AimedApproach, Approach, LevelBound
 from ..time_of_impact.course import Quartic, first_rise, level_and_window
 from ..time_of_impact.looks import FallToBox, falling
@@ -157,7 +157,7 @@ class QuarticCavity(PolynomialNumbers):
 
     def fall(self, gravity, r, v):
         """The level along a fall, for a guess of the hit."""
-        near = self._near(gravity, r, v)
+        near = self.near(gravity, r, v)
         powers = near.c, 2.0 * near.b, near.a2, *near.higher
         rest = 0.0
         for a in reversed(powers[1:]):
@@ -169,9 +169,6 @@ class QuarticCavity(PolynomialNumbers):
         return PolynomialFall(powers, 0.5 * near.window)
 
     def near(self, gravity, r, v):
-        return self._near(gravity, r, v)
-
-    def _near(self, gravity, r, v):
         pull, size = as_vector(gravity), self.size
         level = tuple(self.side * one for one in self.along_fall(r, v, 0.5 * pull))
         window = 2.0 * math.sqrt(size * size / (square(v) + size * norm(pull)))
@@ -195,7 +192,7 @@ class QuarticSolid(QuarticCavity):
 
     def near(self, gravity, r, v):
         # Outside its box there is no wall, whatever phi is there: a fall comes to each face that it is beyond.
-        level = self._near(gravity, r, v)
+        level = QuarticCavity.near(self, gravity, r, v)
         face, beyond = self.last_face(r, v, as_vector(gravity))
         return level._replace(
             c=select(beyond, face.c, level.c), b=select(beyond, face.b, level.b), a2=select(beyond, face.a2, level.a2),

@@ -43,7 +43,7 @@ class AtRest(Record):
         return ZERO
 
     def swept(self, r0, r1):
-        """The displacement of the wall in a step, of what of it is in the middle of the step from r0 to r1."""
+        """The displacement in a step of the point of the wall that is in the middle of the step from r0 to r1."""
         return self.displacement()
 
     def end_inner(self, r):

@@ -20,7 +20,7 @@ from ..surface import Surface
 
 # A motion changes little in this part of a radian, or of a piece of a path.
 _SLOW = 0.05
-# Of an angle up to this one a^4/24 is round-off.
+# Up to this angle a, a^4/24 is round-off.
 LITTLE_ANGLE = (24.0 * EPSILON) ** 0.25
 
 
@@ -126,10 +126,7 @@ class Swings(Record):
 
     def turned(self, vector_in):
         """The swings in a frame that is turned."""
-        each: tuple[Any, ...] = ()
-        for swing in self.each:
-            each = (*each, Swing(vector_in(swing.cosine), vector_in(swing.sine), swing.rate))
-        return Swings(each)
+        return Swings(tuple(Swing(vector_in(one.cosine), vector_in(one.sine), one.rate) for one in self.each))
 
     def amplitude(self):
         """Bound of |s|."""

@@ -95,17 +95,17 @@ class Carried(Walls):
 
 
 class Marched(Carried):
-    """The same where others move in any other way, by safe steps to these, or where some are bodies of a field."""
+    """The walls of a scene, some of which do not move uniformly, or are a field that moves: flights take safe steps."""
 
     accelerate = True
 
 
 class Strided(Marched):
-    """The same where all of these steps are taken in lanes: see strides.py."""
+    """The same, with safe steps that are all taken in lanes: see strides.py."""
 
 
 class Aimed(Strided):
-    """The same where most flights need none of them: see aim.py."""
+    """The same, of which most flights need no safe step: see aim.py."""
 
     def drives(self):
         """The motion of each surface that moves other than uniformly."""
@@ -125,7 +125,7 @@ class Aimed(Strided):
 
 
 class Leaping(Marched):
-    """The same where what moves otherwise as a field are facets: lanes leap through their cells."""
+    """The same, with fields of facets alone: lanes leap through their cells."""
 
 
 def _during(wall, last, remaining, after):

@@ -29,7 +29,7 @@ class Posed(Framed):
     after: float  # of the frame, at the end of the step [s]
 
     def wall(self, number):
-        """Of a field one of its walls."""
+        """One of the walls of a field."""
         return self._replace(body=self.body.wall(number))
 
     def later(self, t):
@@ -128,9 +128,7 @@ class Posed(Framed):
     accelerates = True
 
     def seen(self, flight, t):
-        remaining = flight.remaining - t
-        pose = self.drive.pose(remaining)
-        return flight.seen(t, Posed(self.body, pose, pose, self.drive, remaining, remaining), flight.pull)
+        return flight.seen(t, self.later(t), flight.pull)
 
     def sees(self, gravity, r, v):
         """A particle in the frame of the wall now, as `Seen`."""

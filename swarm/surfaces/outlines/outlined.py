@@ -22,7 +22,7 @@ from ..fields.members import Members, table_of
 from ..parametrised import Triangles, halved
 from ..rotation import Rotated
 from ..shapes.quadratic import QuadricNumbers
-from ..surface import UNBOUNDED, Box, HalfSpace, LevelSet, Surface, side_sign
+from ..surface import UNBOUNDED, Box, HalfSpace, LevelSet, side_sign
 from .outline import Outline
 from .round_side import round_side
 from .sides import FewSides, Side, Sides
@@ -50,11 +50,6 @@ class Outlined(Many):
     face_noun: ClassVar[str] = "side"
     # The argument that gives the outline.
     given: ClassVar[str] = "outline"
-
-    def __post_init__(self) -> None:
-        Surface.__post_init__(self)
-
-    __repr__ = Surface.__repr__
 
     def rows(self) -> Any:
         """The rows of the vertices."""
@@ -129,15 +124,9 @@ class Outlined(Many):
             slope, level = np.where(above > level, lid, slope), np.maximum(above, level)
         return level.reshape(rows.shape[1:]), slope.reshape(rows.shape)
 
-    def admits(self, points: Floats) -> NDArray[np.bool_]:
-        return Surface.admits(self, points)
-
     def corners(self) -> tuple[Floats, Floats]:
         low, high = replace(self, side="inside").bounds()  # type: ignore[call-arg]
         return np.array(low)[:, None], np.array(high)[:, None]
-
-    def shifted(self, shift: Vector) -> Surface:
-        return Surface.shifted(self, shift)
 
     def size(self) -> float:
         smallest = self.boundary.smallest()
@@ -217,12 +206,6 @@ class Outlined(Many):
             found += [AreaSample(area, _on_lid(least[:, None], most[:, None], placed, height)) for height in heights]
         return found
 
-    def enclosing_box(self) -> Box:
-        return Surface.enclosing_box(self)
-
-    def body_count(self) -> int:
-        return 0
-
     def lids(self, across: int) -> list[float]:
         return [] if self.height is None else [0.5 * self.height]
 
@@ -266,13 +249,8 @@ class Outlined(Many):
 
     # --- For kernels ---
 
-    def numbers(self) -> list[int]:
-        """The number of every wall."""
-        return list(range(len(self)))
-
     @cached_property
-    def members(self) -> Members:
-        """The walls as kernels take them."""
+    def members(self) -> Members:  # type: ignore[override]
         table = table_of([self._side(k) for k in range(len(self))])
         like = self._side(0)
         grid = one_cell(len(self)) if len(self) <= _IN_ONE_CELL else grid_of(like, table, self._boxes())
@@ -284,7 +262,7 @@ class Outlined(Many):
         return field_of(sides[0], table, self._boxes, None, largest)
 
     def faces_of_balls(self, largest: float) -> tuple[Members, NDArray[np.int64]]:
-        """As `Many.faces_of_balls`: runs of sides that join smoothly or at an edge towards the balls, and lids."""
+        """As of `ManyBodies`: runs of sides that join smoothly or at an edge towards the balls, and lids."""
         n, sign = len(self.boundary), side_sign(self.side)
         # A ball that is too wide for an arc touches what is next to it on both sides.
         fits = 1.0 - sign * self.boundary.sides.curvature * largest > 0.0

@@ -38,7 +38,7 @@ class Side(Unturned):
 
     holds_balls = False
 
-    # A fall is at a part of the quadric; its level alone does not say when it hits.
+    # The side is a part of the quadric, of which the level alone does not say when a fall hits it.
     is_quartic = may_be_far = in_steps = False
 
     def steps(self, gravity, r, v):
@@ -203,31 +203,22 @@ class Sides(Members, Patched):
     @outlined
     def foot(self, tree, r):
         """Of a point beyond the outline and a lid the root of the sum of the squares of both distances."""
-        least, gap, which = math.inf, -math.inf, 0
-        lid, normal = -math.inf, Vec(0.0, 0.0, 0.0)
-        for m in range(self.table.shape[0]):
-            side = member(self, index(m))
-            signed, away, _within = _beside(side, r)
-            if _is_lid(side):
-                if signed > lid:
-                    lid, normal = signed, _out_of(side, r)
-            elif away < least:
-                least, gap, which = away, signed, m
+        gap, which, lid, above = _nearest_each(self, r)
         if lid > 0.0 and gap > 0.0:
             both = math.sqrt(lid * lid + gap * gap)
-            return SignedDistance(both, (lid / both) * normal + (gap / both) * _out_of(member(self, index(which)), r))
-        return SignedDistance(lid, normal) if lid > gap else SignedDistance(gap, _out_of(member(self, index(which)), r))
+            return SignedDistance(both, (lid / both) * _out_of(self, above, r) + (gap / both) * _out_of(self, which, r))
+        return SignedDistance(max(gap, lid), _out_of(self, above if lid > gap else which, r))
 
     def is_there(self, number, r, near):
         """Whether a side reaches to a place on its wall, or nearer to it than that."""
         side = self.wall(number)
-        r, side = (side.place_in(r), side.body) if isinstance(side, Rotated) else (r, side)
+        r, side = _in_frame(side, r)
         return side.is_within(r - side.body.center, side.slack + near)
 
     def wall_after(self, number, r, near):
         """The side on which what slides on this one goes on beyond its end at r, -1 where it has a corner there."""
         side = self.wall(number)
-        r, side = (side.place_in(r), side.body) if isinstance(side, Rotated) else (r, side)
+        r, side = _in_frame(side, r)
         d = side.along_plane(r - side.body.center)
         return select(norm(d) < norm(d - side.end), side.joined_before, side.joined_after)
 
@@ -277,30 +268,34 @@ def _nearest(sides, r):
     """How far a point is outside of the outline or beyond a lid, and the number of that side or lid."""
     if sides.is_gone():
         return -math.inf, -1.0
-    least, found, which, above, lid = math.inf, -math.inf, -1.0, -math.inf, -1.0
+    gap, which, lid, above = _nearest_each(sides, r)
+    return (lid, above) if lid > gap else (gap, which)
+
+
+def _nearest_each(sides, r):
+    """How far a point is outside of the outline, and the number of that side; how far beyond a lid, and that number."""
+    least, gap, which, lid, above = math.inf, -math.inf, 0.0, -math.inf, 0.0
     # All of them: that of the cell that is nearest may be the back of a thin wall.
     for m in range(sides.table.shape[0]):
         side = member(sides, index(m))
-        signed, away, _within = _beside(side, r)
-        if _is_lid(side):
-            if signed > above:
-                above, lid = signed, float(m)
+        own, body = _in_frame(side, r)
+        signed, away, _within = body.beside(own)
+        if square(body.end) == 0.0:
+            if signed > lid:
+                lid, above = signed, float(m)
         # At a corner both its sides are at one distance, and it says the same of both.
         elif away < least:
-            least, found, which = away, signed, float(m)
-    return (above, lid) if above > found else (found, which)
+            least, gap, which = away, signed, float(m)
+    return gap, which, lid, above
 
 
-def _beside(side, r):
-    """`beside` of a side, which may be turned."""
-    return side.body.beside(side.place_in(r)) if isinstance(side, Rotated) else side.beside(r)
+def _in_frame(side, r):
+    """A point in the frame of a side, and the side there, which may be turned in the scene."""
+    return (side.place_in(r), side.body) if isinstance(side, Rotated) else (r, side)
 
 
-def _is_lid(side):
-    body = side.body if isinstance(side, Rotated) else side
-    return square(body.end) == 0.0
-
-
-def _out_of(side, r):
-    """`out` of a side, which may be turned."""
-    return side.vector_out(side.body.out(side.place_in(r))) if isinstance(side, Rotated) else side.out(r)
+def _out_of(sides, number, r):
+    """`out` of the side with this number."""
+    side = member(sides, index(int(number)))
+    own, body = _in_frame(side, r)
+    return side.vector_out(body.out(own)) if isinstance(side, Rotated) else body.out(own)

@@ -11,11 +11,11 @@ from ...kernel.jit import outlined, select
 from ...kernel.record import Record
 from ..time_of_impact.course import rise_time
 
-# What leaves goes so far beyond the face, in lengths of the cell; a step that ends within twice that has left well.
+# A flight that leaves ends so far beyond the face, in lengths of the cell; a step may end at most twice as far.
 _BEYOND = 5e-10
 # A flight that goes on over cells ends after so many; their number is a float with digits to spare for the position.
 CELLS = 2.0**40
-# Of a length of the cell, the part by which a flight may end later for the sake of its time.
+# A flight may end later by this part of a length of the cell, so that what it leaves of the frame is exact.
 _LATER = 1e-4
 
 

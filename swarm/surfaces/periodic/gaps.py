@@ -13,7 +13,8 @@ from ..time_of_impact.course import rise_time
 from ..time_of_impact.flights import Hit
 from .axes import CELLS, Free, least, length_of, most, pulls, time_far, time_out
 
-# Of a length of the cell, the part within which a flight begins at a face: as far beyond the other walls are known.
+# A flight that is nearer to a face than this part of the length of the cell begins at it: beyond the other face walls
+# are known as far as that.
 _AT_FACE = 5e-4
 
 

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...common import checks
-from ...common.checks import Vector
 from ...errors import SceneError
 from ...motion import Oscillation, Path, Rotation, Translation, parts_of, unit_axis
 from ..facets.mesh import Mesh
-from ..fields.many import Many
+from ..fields.many import Many, ManyBodies
 from ..outlines.outlined import Outlined
 from ..surface import Box, Surface
 
@@ -49,7 +48,7 @@ def images_of(surface: Surface, period: Lengths, name: str, largest: float = 0.0
     if isinstance(surface, Outlined):
         _require_within(surface, period, name, largest if surface.is_solid() else 0.0)
         return [surface]
-    if isinstance(surface, Many):
+    if isinstance(surface, ManyBodies):
         return [_many_images(surface, period, name, largest)]
     low, high = extent_of(surface)
     shifts: list[list[float]] = [[0.0], [0.0], [0.0]]
@@ -79,7 +78,7 @@ def _require_within(surface: Outlined, period: Lengths, name: str, largest: floa
             )
 
 
-def _many_images(field: Many, period: Lengths, name: str, largest: float) -> Many:
+def _many_images(field: ManyBodies, period: Lengths, name: str, largest: float) -> ManyBodies:
     """A field with the images of its bodies, as far as they reach into the cell."""
     low, high = field.corners()
     shifts = [np.zeros((1, 3))]
@@ -243,17 +242,12 @@ def into_cell(period: Lengths, points: NDArray[np.float64]) -> tuple[NDArray[np.
 
 def cell_of(period: Lengths) -> Box:
     """Two corners of the cell, infinite where it does not repeat."""
-    low = tuple(-math.inf if length is None else 0.0 for length in period)
-    high = tuple(math.inf if length is None else length for length in period)
-    return _corner(low), _corner(high)
+    x, y, z = (math.inf if length is None else length for length in period)
+    low = [-math.inf if length is None else 0.0 for length in period]
+    return (low[0], low[1], low[2]), (x, y, z)
 
 
 def corners_of(period: Lengths) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The same as arrays (3,)."""
     low, high = cell_of(period)
     return np.array(low), np.array(high)
-
-
-def _corner(values: tuple[float, ...]) -> Vector:
-    x, y, z = values
-    return x, y, z

@@ -15,10 +15,11 @@ from typing import Annotated, Any
 from ...common import checks
 from ...common.validated import Flag, Validated
 from ...errors import SceneError
-from ...kernel.gravity import as_vector
 from ...kernel.jit import select
+from ...kernel.record import Record
+from ..contract import Smooth
 from ..frames import Unturned
-from ..time_of_impact.course import Fall, Quartic, close
+from ..time_of_impact.course import Quartic
 from ..time_of_impact.rising import LevelStep
 
 # The distance at which a particle is from a wall that is not there, and the level of such a wall.
@@ -130,9 +131,6 @@ class Present(Unturned):
     # Its safe steps are taken in lanes only where its level is known as a whole.
     in_steps, has_levels, kept, aims, fall_powers, looked_at = False, False, 0, False, 0, False
 
-    def flat_normal(self):
-        return self.body.flat_normal()
-
     def _if_there(self, value, other):
         return select(self.there > 0.0, value, other)
 
@@ -169,17 +167,52 @@ class Present(Unturned):
         # One that is not there has the level -1 for ever.
         return Quartic(self._if_there(level.c, -1.0), b, a2, a3, a4, self._if_there(level.window, math.inf))
 
-    def steps(self, gravity, r, v):
-        if gravity is None or not self.is_quartic:
-            return None
-        level = self.course(r, v, as_vector(gravity))
-        return Fall(level, close(level.window), self.may_be_far)
+    steps = Smooth.steps
 
     def moving_step(self, seen, longest):
         step = self.body.moving_step(seen, longest)
         return LevelStep(
             self._if_there(step.level, -1.0), self._if_there(step.half, 0.0), self._if_there(step.time, longest)
         )
+
+
+class Ajar(Present):
+    """A wall over a step, and whether it stands: 1, or 0 where it is open to the particle at the start of the step."""
+
+    def displacement(self):
+        return self.body.displacement()
+
+    def swept(self, r0, r1):
+        return self.body.swept(r0, r1)
+
+    def place_scale(self, s):
+        return self.body.place_scale(s)
+
+    def framed(self, r, p):
+        body, start, way = self.body.framed(r, p)
+        return self._replace(body=body), start, way
+
+
+class Faced(Record):
+    """The walls of a scene as one step of a particle meets them."""
+
+    walls: Any
+    stand: tuple[Any, ...]  # of each wall 1, or 0 where it is open
+
+    def length(self):
+        """The number of rows, as that of the walls."""
+        return self.walls.length()
+
+    def at(self, remaining):
+        """The walls when so much of the frame is left [s]."""
+        return self._of(self.walls.at(remaining))
+
+    def during(self, remaining, after):
+        """The walls over a step; at its start and end so much of the frame is left [s]."""
+        return self._of(self.walls.during(remaining, after))
+
+    def _of(self, now):
+        return now._replace(each=tuple(Ajar(wall, one) for wall, one in zip(now.each, self.stand, strict=True)))
 
 
 def walls_then(surface: Any, moment: float, largest: float | None = None) -> tuple[Any, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...state import Floats
 from ..facets.flat import DIGITS, keys_of
-from ..fields.many import Many
+from ..fields.many import ManyBodies
 from ..instant import are_there_together, distances, side_of
 from ..surface import Surface
 from .seams import ENOUGH, FAR, OUTSIDE, PLACES, Face, faces_of
@@ -118,7 +118,7 @@ def flush_faces(surfaces: Sequence[Surface]) -> dict[tuple[int, int], float]:
 def bodies_of(surfaces: Sequence[Surface]) -> Iterator[OneBody]:
     """The surfaces, of fields the first bodies."""
     for i, surface in enumerate(surfaces):
-        if not isinstance(surface, Many) or not surface.body_count() or surface.is_foam():
+        if not isinstance(surface, ManyBodies) or not surface.body_count() or surface.is_foam():
             yield OneBody(i, None, surface)
             continue
         some = np.arange(min(len(surface), MOST_BODIES))
@@ -159,7 +159,7 @@ def extended(surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
             rows.setdefault(i, {})[row] = body
     for i, bodies in rows.items():
         field = surfaces[i]
-        assert isinstance(field, Many)
+        assert isinstance(field, ManyBodies)
         made[i] = field.with_bodies(bodies)
     return tuple(made)
 
@@ -201,7 +201,7 @@ def _places_of(solid: Surface, number: int, size: float, random: np.random.Gener
     """Points (3, N) in the plane of a face of a solid, among which are some on the face, and points on its rim."""
     if (known := solid.places_of_flat_face(number, PLACES)) is not None:
         return known
-    low, high = (np.clip(corner, -size, size)[:, None] for corner in _filled(solid).bounds())
+    low, high = (np.clip(corner, -size, size)[:, None] for corner in solid.at_rest().filled().bounds())
     face = face_of(solid, number)
     flat = face.onto(low + (high - low) * random.random((3, PLACES)))
     rim = np.concatenate([face.onto(side.onto(flat)) for side in faces_of(solid)], axis=1)
@@ -219,7 +219,7 @@ def _share_a_place(first: tuple[Surface, int], second: tuple[Surface, int], size
     one, other = first[0], second[0]
     if one.motion != other.motion or not are_there_together(one, other):
         return False
-    boxes = np.array([_filled(surface).bounds() for surface in (one, other)])
+    boxes = np.array([surface.at_rest().filled().bounds() for surface in (one, other)])
     reach = size + float(np.abs(boxes[np.isfinite(boxes)]).max(initial=0.0))
     least, most = np.clip([boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)], -reach, reach)
     if (least > most + 10.0 ** (1 - DIGITS) * size).any():
@@ -232,8 +232,3 @@ def _share_a_place(first: tuple[Surface, int], second: tuple[Surface, int], size
     with np.errstate(all="ignore"):
         off = [np.abs(surface.at_rest().phi(points)) for surface in (one, other)]
     return bool((np.maximum(*off) <= 10.0**-DIGITS * size).any())
-
-
-def _filled(surface: Surface) -> Surface:
-    """The surface at rest, with the inside as its admissible side."""
-    return replace(surface.at_rest(), side="inside") if surface.is_solid() else surface.at_rest()  # type: ignore[call-arg]

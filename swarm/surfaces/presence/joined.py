@@ -9,12 +9,12 @@ import numpy as np
 
 from ...kernel.vector import Vec, norm
 from ..in_motion.moving import Marched, Strided
-from ..surface import Surface
+from ..surface import Surface, slopes_of
 from ..walls import Walls
 
-# Of the extent of a union, the slack of its rooms.
+# The slack of rooms, as a part of the extent of their union.
 _SLACK = 1e-13
-# Of it, how far inside what meets a wall is put where rooms touch.
+# Where rooms touch, a particle that meets a wall is put so many times the slack inside of it.
 _INSET = 3.0
 # A place is on a wall up to this distance from it, relative to the extent. Two walls touch if so many of the places on
 # one are on the other.
@@ -45,9 +45,9 @@ def _wall_between(one: Sequence[Surface], other: Sequence[Surface]) -> bool:
             places = np.array(_places_on(wall, surface.extent()))
             there = Vec(*places)
             with np.errstate(all="ignore"):
-                n = wall.side * _slopes(wall, there)
+                n = wall.side * slopes_of(wall, there)
                 for mate in (mate for neighbour in other for mate in neighbour.walls()):
-                    m = mate.side * _slopes(mate, there)
+                    m = mate.side * slopes_of(mate, there)
                     size = np.sqrt((m**2).sum(axis=0))
                     on_it = np.abs(mate.phi(there)) <= _TOUCHES * extent * size
                     opposite = (n * m).sum(axis=0) < -0.999999 * size * np.sqrt((n**2).sum(axis=0))
@@ -61,13 +61,9 @@ def _places_on(wall: Any, extent: float) -> Any:
     places = (extent or 1.0) * np.random.default_rng(0).uniform(-1.0, 1.0, (3, _PLACES))
     with np.errstate(all="ignore"):
         for _move in range(_MOVES):
-            slope = _slopes(wall, Vec(*places))
+            slope = slopes_of(wall, Vec(*places))
             places = places - wall.phi(Vec(*places)) / (slope**2).sum(axis=0) * slope
     return places
-
-
-def _slopes(wall: Any, places: Vec) -> Any:
-    return np.array(np.broadcast_arrays(*wall.gradient(places), places.x)[:3])
 
 
 def _gentle(surface: Surface) -> list[float]:

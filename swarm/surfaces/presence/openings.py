@@ -35,7 +35,7 @@ from .rooms import leads_on
 _MOST = 24
 # Places of a wall at which a counter is looked for in an opening, and Newton's steps onto the wall for each.
 _PLACES, _NEWTON = 4096, 8
-# A volume without end is searched as far as this many times the wall and what gives the volume extend.
+# A volume without end is searched as far as this many times the larger extent, of the wall or of the volume.
 _REACH = 2.0
 
 
@@ -198,17 +198,18 @@ def require_few(openings: Sequence[Opened]) -> None:
 
 def reaches(surface: Surface, opening: Surface) -> bool:
     """Whether a volume has points on both sides of a wall."""
-    both = _gap(opening, sign_of(opening)), _gap(surface, side_of(surface))
     low, high = _box_around(surface, opening)
-    return all(
-        has_room(
+
+    def has_points(side: float) -> bool:
+        both = (sign_of(opening), opening), (side, surface)
+        return has_room(
             low,
             high,
-            lambda points, sign=sign: np.array([both[0][0](points), sign * both[1][0](points)]),  # type: ignore[misc]
-            lambda i, points, sign=sign: (sign if i else 1.0) * both[i][1](points),  # type: ignore[misc]
+            lambda points: np.array([sign * one.phi(points) for sign, one in both]),
+            lambda i, points: both[i][0] * both[i][1].gradient(points),
         )
-        for sign in (1.0, -1.0)
-    )
+
+    return has_points(side_of(surface)) and has_points(-side_of(surface))
 
 
 def least_distance(surface: Surface, volumes: Sequence[Surface], other: Surface) -> float:
@@ -240,11 +241,6 @@ def _box_around(surface: Surface, opening: Surface) -> Any:
     # Also where the box of a flat volume has no width
     room = 1e-9 * reach
     return np.maximum(low - room, -reach), np.minimum(high + room, reach)
-
-
-def _gap(surface: Surface, sign: float) -> Any:
-    """The gap of a surface, and its gradient, at points."""
-    return lambda points: sign * surface.phi(points), lambda points: sign * surface.gradient(points)
 
 
 def sign_of(opening: Surface) -> float:

@@ -32,17 +32,17 @@ from .doors import Opening
 
 # So many roundings of its size apart faces are one.
 _ROUNDINGS = 4.0 * np.finfo(np.float64).eps
-# Of the size: the distance beside a face at which a room is there, and the part of that by which it is.
+# A room is at a face if it is at this distance beside it, a part of the size, deeper than by this part of the distance.
 _BESIDE, _WITHIN = 1e-7, 0.5
 # The reach by which it is asked whether a face lies within another one, and how far outside of that it may be then.
 FAR, OUTSIDE = 1e-6, 1e-9
-# Of the size, how far a room without end is searched.
+# A room without end is searched as far as this many times the size.
 _REACH = 2.0
 # Places that are tried, moves of each, and how far each move aims.
 PLACES, _MOVES, _PAST = 512, 24, 1.05
 # Places that a room gains: so many are tried, and fewer are not enough to say where it gains them.
 _MANY, ENOUGH = 4096, 8
-# Of the normals of round faces that are one, the least cosine, less 1.
+# Two round faces are one where the cosine of their normals is -1 up to this.
 _OPPOSITE = 1e-9
 
 

@@ -81,7 +81,9 @@ class Slab(Surface):
 
 
 class Along(Record):
-    """An axis of the scene as a unit vector."""
+    """An axis of the scene as a unit vector, of which a kind says which axis."""
+
+    length: float  # 1: a record has a field
 
     axis = 0
 
@@ -91,36 +93,23 @@ class Along(Record):
 
     def scaled(self, k):
         """It times a number."""
-        raise NotImplementedError
+        return Vec(*(k if i == self.axis else 0.0 for i in range(3)))
 
 
 class AlongX(Along):
     """The x axis."""
 
-    x: float
-
-    def scaled(self, k):
-        return Vec(k, 0.0, 0.0)
-
 
 class AlongY(Along):
     """The y axis."""
 
-    y: float
     axis = 1
-
-    def scaled(self, k):
-        return Vec(0.0, k, 0.0)
 
 
 class AlongZ(Along):
     """The z axis."""
 
-    z: float
     axis = 2
-
-    def scaled(self, k):
-        return Vec(0.0, 0.0, k)
 
 
 AXES: tuple[Any, ...] = (AlongX, AlongY, AlongZ)

@@ -12,12 +12,10 @@ import numpy as np
 from ...kernel.gravity import displacement
 from ...kernel.jit import select
 from ...kernel.limits import EPSILON, TINY
-from ...kernel.record import Record
-from ...kernel.vector import ZERO, Symmetric, Vec, absolute, total
+from ...kernel.vector import ZERO, Symmetric, absolute, total
 from .. import contract
 from ..curvature import SPACING, half_hessian
-from ..time_of_impact.approach import place
-from ..time_of_impact.course import under_way
+from ..time_of_impact.approach import Approach
 from ..time_of_impact.rising import LevelStep
 
 # Round-off of a part's level, in units of the last place of its largest terms.
@@ -131,13 +129,8 @@ def _bend_of_largest(parts, r, h):
 # --- Flight ----------------------------------------------------------------------------------------------
 
 
-class Entering(Record):
+class Entering(Approach):
     """The steps of a flight until it is inside of all parts, each to where one is still to be entered, or again."""
-
-    body: SolidNumbers
-    gravity: Any
-    r: Vec
-    v: Vec
 
     # What is not found by then goes on in the next pass.
     most = 99
@@ -145,18 +138,15 @@ class Entering(Record):
     def first_step(self):
         return self.next_step(0.0, math.inf)
 
-    def next_step(self, t, last):
+    def step_from(self, p, w, last):
         # Until the last of the parts is entered the flight is outside of that one; by then it may have left another.
-        body, gravity = self.body, self.gravity
-        p, w = place(gravity, self.r, self.v, t, last)
+        body, gravity = self.surface, self.gravity
         wait, found = _last_entry(body.parts, gravity, body.extent, p, w)
         moved = total(absolute(displacement(gravity, w, wait)))
         # The place is known to round-off of its own coordinates and of those the flight comes from.
         coordinates = total(absolute(p)) + abs(self.r.x) + abs(self.r.y) + abs(self.r.z)
         is_in = found & (moved <= 4.0 * EPSILON * (coordinates + body.extent))
-        goes_on = under_way(t, last)
-        length = select(is_in, 0.0, select(wait > 0.0, wait, TINY))
-        return select(goes_on, t + wait, t), select(goes_on, length, last)
+        return wait, select(is_in, 0.0, select(wait > 0.0, wait, TINY))
 
 
 def _last_entry(parts, gravity, extent, r, v):

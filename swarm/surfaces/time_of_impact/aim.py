@@ -14,12 +14,11 @@ from typing import Any
 from ...kernel.elementary import nearly_sine_and_versine_of, reduced, sine_and_versine_of
 from ...kernel.jit import select
 from ...kernel.limits import EPSILON
-from ...kernel.vector import norm
 from ..in_motion.drive import LITTLE_ANGLE, Wave
 from ..in_motion.moving import Moving
-from .rising import ThirdDerivativeBound, flight_of, nearest_root
-from .safe import closed_hit, seen_by_walls
-from .strides import CLOSED, MET, OTHER, SPEED, TIME
+from . import strides
+from .rising import flight_of, nearest_root
+from .strides import CLOSED, MET, SPEED, TIME, levels_of
 
 # Of a lane besides what its strides know: the guess, the way from there to the nearest root, the wall and the parabola
 # that have it, and what round-off at the guess is relative to. Then of each wall until when its passage is free, or
@@ -35,14 +34,11 @@ AIMS = 2
 
 def start(walls, gravity, course, lane, r, v, remaining):
     """The guess of a lane's first hit, and what its start says of all of its flight."""
-    found, speed = closed_hit(walls.at(remaining), gravity, r, v), norm(v)
-    course[TIME, lane], course[MET, lane] = 0.0, -1.0
-    course[CLOSED, lane], course[OTHER, lane], course[SPEED, lane] = found.time, found.wall, speed
-    longest = select(found.time < remaining, found.time, remaining)
-    guess = math.inf
+    strides.start(walls, gravity, course, lane, r, v, remaining)
+    longest, guess = _longest(course, lane, remaining), math.inf
     starts: tuple[Any, ...] = ()
     here = with_waves(walls, course, lane) if lacks_passages(walls) else walls
-    known = _known(here, gravity, speed, r, v, remaining, 0.0)
+    known = _known(here, gravity, course[SPEED, lane], r, v, remaining, 0.0)
     for _number, one in known:
         way, level = one.seen.drive.passage(one.body, r, v, remaining), one.level
         if way is not None:
@@ -112,9 +108,7 @@ def carry_waves(walls, course, lane):
 
 def _waves(walls):
     """(the first row of a wave, its rate) of each that is kept."""
-    rates: tuple[float, ...] = ()
-    for drive in _known_drives(walls):
-        rates = (*rates, *drive.rates())
+    rates = tuple(rate for drive in _known_drives(walls) for rate in drive.rates())
     return tuple((_first_wave(walls) + k * _OF_WAVE, rate) for k, rate in enumerate(rates))
 
 
@@ -154,8 +148,7 @@ def put_way(course, lane):
 
 def improve(course, lane, remaining):
     """A guess that is nearer to the hit."""
-    guess, closed = course[GUESS, lane], course[CLOSED, lane]
-    longest = select(closed < remaining, closed, remaining)
+    guess, longest = course[GUESS, lane], _longest(course, lane, remaining)
     after = guess + nearest_root(*(course[_NEAREST + i, lane] for i in range(3)))
     after = select(after < longest, after, longest)
     course[GUESS, lane] = select((guess > 0.0) & (after > 0.0), after, guess)
@@ -163,8 +156,7 @@ def improve(course, lane, remaining):
 
 def _end(course, lane, remaining):
     """(when the flight of a lane meets a wall or ends, how far that is from the guess, whether it meets one)."""
-    guess, way, closed = course[GUESS, lane], course[_WAY, lane], course[CLOSED, lane]
-    longest = select(closed < remaining, closed, remaining)
+    guess, way, longest = course[GUESS, lane], course[_WAY, lane], _longest(course, lane, remaining)
     time = guess + way
     meets = time < longest
     return select(meets, time, longest), select(meets, way, longest - guess), meets
@@ -218,20 +210,18 @@ def prove(walls, gravity, course, lane, r, v, remaining, by_series):
 
 def lacks_passages(walls):
     """Whether some walls have no passage."""
-    found = False
-    for wall in walls.each:
-        if isinstance(wall, Moving) and wall.accelerates and not (wall.drive.only_swings() and wall.body.has_core):
-            found = True
-    return found
+    return not all(_have_passages(walls))
 
 
 def has_series(walls):
     """Whether the proof by series says more than that by passages, of which some walls have one."""
-    found = False
-    for wall in walls.each:
-        if isinstance(wall, Moving) and wall.accelerates and wall.drive.only_swings() and wall.body.has_core:
-            found = True
-    return found
+    return any(_have_passages(walls))
+
+
+def _have_passages(walls):
+    """Of each wall that moves other than uniformly whether its flights have a passage."""
+    moving = (wall for wall in walls.each if isinstance(wall, Moving) and wall.accelerates)
+    return tuple(wall.drive.only_swings() and wall.body.has_core for wall in moving)
 
 
 def rows(walls):
@@ -250,16 +240,17 @@ def open_rows(walls):
 
 def is_open(course, lane, remaining):
     """Whether it is not proven yet where the first hit of a lane is, or that the lane meets no wall."""
+    return (course[MET, lane] < 0.0) & (course[TIME, lane] < _longest(course, lane, remaining))
+
+
+def _longest(course, lane, remaining):
+    """When the flight of a lane ends: with the frame, or at the first hit that has a closed form."""
     closed = course[CLOSED, lane]
-    return (course[MET, lane] < 0.0) & (course[TIME, lane] < select(closed < remaining, closed, remaining))
+    return select(closed < remaining, closed, remaining)
 
 
 def _known(walls, gravity, speed, r, v, remaining, t):
-    flight = flight_of(r, v, gravity, remaining, speed)
-    return tuple(
-        (number, ThirdDerivativeBound(wall.body, seen, wall.body.level_along(seen)))
-        for wall, number, seen in seen_by_walls(walls, flight, t)
-    )
+    return levels_of(walls, flight_of(r, v, gravity, remaining, speed), t)
 
 
 def _nearest_rise(known):

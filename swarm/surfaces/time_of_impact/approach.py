@@ -90,13 +90,20 @@ class Approach(Record):
         return self.surface.near(self.gravity, self.r, self.v).first_step()
 
     def next_step(self, t, last):
+        goes_on = under_way(t, last)
+        # Where there are no more steps, that from the start counts for nothing.
+        s = select(goes_on, t, 0.0)
+        place, velocity = self.r + displacement(self.gravity, self.v, s), accelerated(self.gravity, self.v, s)
+        step, length = self.step_from(place, velocity, last)
+        return select(goes_on, t + step, t), select(goes_on, length, last)
+
+    def step_from(self, p, w, last):
+        """(the step from a place with a velocity, its length or 0 if it is the last)."""
         # The parabola holds for twice the last step, or without end where the level is one itself.
-        level = self.surface.near(self.gravity, *place(self.gravity, self.r, self.v, t, last))
+        level = self.surface.near(self.gravity, p, w)
         reach = select(level.window < math.inf, 2.0 * last, math.inf)
         above, rise, size = level.bounds(reach)
-        step, length = level.step(above.rises(rise, reach), reach, size)
-        goes_on = under_way(t, last)
-        return select(goes_on, t + step, t), select(goes_on, length, last)
+        return level.step(above.rises(rise, reach), reach, size)
 
 
 class AimedApproach(Approach):
@@ -110,9 +117,3 @@ class AimedApproach(Approach):
     def first_safe_step(self):
         """The first step where no guess has led to the root."""
         return Approach.first_step(self)
-
-
-def place(gravity, r, v, t, last):
-    """The place after the steps of a flight, and the velocity there; its start where there are no more of them."""
-    s = select(under_way(t, last), t, 0.0)
-    return r + displacement(gravity, v, s), accelerated(gravity, v, s)

@@ -297,15 +297,11 @@ def _known(wall, gravity, course, row, k, lane, flight):
 
 def hit_of(walls, gravity, wall, r, v):
     """`hit` of the wall with this number."""
-    first, found = math.inf, True
-    for number, one in reversed(walls.numbered()):
-        if isinstance(one, Field):
-            surface, here = one.members.wall(wall - number), wall < number + one.count()
-        else:
-            surface, here = one, wall == number
-        time, hits = hit(gravity, surface, r, v)
-        first, found = select(here, time, first), (here & hits) | ((not here) & found)
-    return first, found
+    return walls.of(wall, (math.inf, True), _hit_of, gravity, r, v)
+
+
+def _hit_of(surface, gravity, r, v):
+    return hit(gravity, surface, r, v)
 
 
 def other_hit(walls, wall, r, v, until=math.inf):

@@ -211,22 +211,12 @@ class FallToBox(FallByLooks):
     def see(self, known):
         here, t, surface = FallByLooks.see(self, known), known.at, self.surface
         face, beyond = surface.last_face(here.place, self.v + t * self.pull, self.pull)
-        level, half, least, most, until = (
-            select(beyond, *pair)
-            for pair in (
-                (face.c, here.level),
-                (face.b, here.half),
-                (face.a2, here.least),
-                (face.a2, here.most),
-                (math.inf, here.until),
-            )
-        )
         return here._replace(
-            level=level,
-            half=half,
-            least=least,
-            most=most,
-            until=until,
+            level=select(beyond, face.c, here.level),
+            half=select(beyond, face.b, here.half),
+            least=select(beyond, face.a2, here.least),
+            most=select(beyond, face.a2, here.most),
+            until=select(beyond, math.inf, here.until),
             rises=beyond | here.rises,
             lets_go=here.lets_go & (not beyond),
             ends=beyond,

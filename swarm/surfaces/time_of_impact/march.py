@@ -158,20 +158,16 @@ def safe_step(surface, r, v, pull, slack):
         most = max(most, 0.0)
         m0 = most * speed2 + 0.5 * side * dot(n, pull)
         m1 = (2.0 * most + magnitude) * g
-    step = _step_within(level, half, m0 + select(m1 > 0.0, m1 * reach, 0.0), time_to_travel(speed, g, reach))
+    # The root of the parabola above the level, within the time in which its bound holds
+    bound = m0 + select(m1 > 0.0, m1 * reach, 0.0)
+    step = min(rise_time(level, half, bound), time_to_travel(speed, g, reach))
     if m1 > 0.0 and (step > 0.0 or m0 < 0.0):
         # Again with the M of a shorter way: of twice that step, or as far as a fall off the wall surely bends away.
         shorter = min(reach, max(2.0 * travelled(speed, g, step), -0.5 * m0 / m1))
-        within = _step_within(level, half, m0 + select(m1 > 0.0, m1 * shorter, 0.0), time_to_travel(speed, g, shorter))
-        step = max(step, within)
+        step = max(step, min(rise_time(level, half, m0 + m1 * shorter), time_to_travel(speed, g, shorter)))
     if clear > 0.0:
         step = max(step, time_to_travel(speed, g, clear))
     return level, half, step, travelled(speed, g, step), norm(n)
-
-
-def _step_within(level, half, bound, longest):
-    """The root of the parabola above the level, within the time in which its bound holds."""
-    return min(rise_time(level, half, bound), longest)
 
 
 def time_to_travel(speed, g, way):

@@ -64,6 +64,18 @@ def _guess(c, b, a2, a3, turn):
     return t + sign * (over / select(under == 0.0, _TINY, under))
 
 
+def bernstein(powers, t):
+    """The Bernstein coefficients of a level from 0 to t: b_j = sum C(j, k) a_k t^k/C(n, k), by Pascal's triangle."""
+    n, power = len(powers) - 1, 1.0
+    row: Any = ()
+    for k, a in enumerate(powers):
+        row = (*row, power * a * (1.0 / math.comb(n, k)))
+        power = power * t
+    for k in range(n):
+        row = (*row[: k + 1], *(one + other for one, other in zip(row[k:-1], row[k + 1 :], strict=True)))
+    return row
+
+
 def _are_below(coefficients):
     """Whether a level with these Bernstein coefficients is surely below 0, but for its end if that is left out."""
     below = True
@@ -267,19 +279,8 @@ class PolynomialFall(Guessed):
 
     def is_free(self, until):
         """Whether it is surely below 0 until this time."""
-        return _are_below(self._bernstein(until))
+        return _are_below(bernstein(self.powers, until))
 
     def _is_below(self, root, is_last):
-        before = self._bernstein(root)[:-1]
+        before = bernstein(self.powers, root)[:-1]
         return _are_below(before) | (is_last & _are_below_in_halves((*before, 0.0)))
-
-    def _bernstein(self, t):
-        """Its Bernstein coefficients from 0 to t: b_j = sum C(j, k) a_k t^k/C(n, k), by Pascal's triangle."""
-        n, power = len(self.powers) - 1, 1.0
-        row: Any = ()
-        for k, a in enumerate(self.powers):
-            row = (*row, power * a * (1.0 / math.comb(n, k)))
-            power = power * t
-        for k in range(n):
-            row = (*row[: k + 1], *(one + other for one, other in zip(row[k:-1], row[k + 1 :], strict=True)))
-        return row

@@ -35,11 +35,7 @@ def stride(walls, gravity, course, lane, r, v, remaining, is_first):
     """One stride of a lane that has not met a wall."""
     t, met, closed = course[TIME, lane], course[MET, lane], course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining) - t
-    flight = flight_of(r, v, gravity, remaining, course[SPEED, lane])
-    known = tuple(
-        (number, ThirdDerivativeBound(wall.body, seen, wall.body.level_along(seen)))
-        for wall, number, seen in seen_by_walls(walls, flight, t)
-    )
+    known = levels_of(walls, flight_of(r, v, gravity, remaining, course[SPEED, lane]), t)
     within, ahead = _first_rise(known), AHEAD * pace(walls)
     ahead = select(ahead < longest, ahead, longest)
     within = select(within < ahead, within, ahead)
@@ -50,6 +46,14 @@ def stride(walls, gravity, course, lane, r, v, remaining, is_first):
     under_way = (met < 0.0) & (longest > 0.0)
     course[TIME, lane] = select(under_way, after, t)
     course[MET, lane] = select(under_way & meets & (time <= within), wall, met)
+
+
+def levels_of(walls, flight, t):
+    """(the number of a wall, the `ThirdDerivativeBound` of its level then) of each that is met by strides."""
+    return tuple(
+        (number, ThirdDerivativeBound(wall.body, seen, wall.body.level_along(seen)))
+        for wall, number, seen in seen_by_walls(walls, flight, t)
+    )
 
 
 def _through_cores(known, r, v, remaining, t, longest):

@@ -17,7 +17,8 @@ TOP = np.flatnonzero((CORNERS[FACES][:, :, 2] == 0.5).all(axis=1))
 def mesh_of(vertices, faces, weld=None):
     count = len(faces)
     soup = Soup(np.asarray(vertices, float), np.asarray(faces, np.int64), np.arange(count) % 3, ("a", "b", "c"))
-    return triangles.closed("part.stl", soup, weld)
+    mesh, _moved = triangles.closed("part.stl", soup, weld)
+    return mesh
 
 
 def volume(mesh):

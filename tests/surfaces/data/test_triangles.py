@@ -53,7 +53,7 @@ def test_a_seam_closes(tmp_path, whole, gap):
 def test_what_is_joined_grows_with_the_mesh(tmp_path, size):
     corners, faces = halves(1e-6, size)
     assert 1e-7 < swarm.from_mesh(written(tmp_path, corners, faces), 0.1 * size).mesh_weld / size < 2e-6
-    assert len(triangles.read_mesh(written(tmp_path, size * CORNERS, FACES), 1.0, None).vertices) == len(CORNERS)
+    assert len(triangles.read_mesh(written(tmp_path, size * CORNERS, FACES), 1.0, None)[0].vertices) == len(CORNERS)
 
 
 def test_no_edge_of_a_seam_vanishes(tmp_path):
