@@ -122,7 +122,7 @@ class Particles:
     def fastest(self, against: Floats | None = None) -> float:
         """Return the largest speed [m/s], relative to a velocity `against` (3,) [m/s] if given."""
         velocity = self.velocity if against is None else self.velocity - against[:, None]
-        return float(np.sqrt(np.nanmax((velocity**2).sum(axis=0), initial=0.0)))
+        return float(np.sqrt(np.fmax.reduce((velocity**2).sum(axis=0), initial=0.0)))
 
     def born(self) -> "Particles":
         """Return the particles without rows of NaN, which in a frame of a run with sources are particles not yet born.
@@ -202,7 +202,7 @@ def _each(name: str, value: ArrayLike, n: int, unit: str) -> Floats:
     given = checks.array(name, value)
     if given.ndim > 1 or (given.ndim == 1 and given.size != n):
         raise SceneError(f"{name} must be one number or have shape ({n},), got shape {given.shape}")
-    given = np.full(n, given)
+    given = given + np.zeros(n)
     # NaN compares as false.
     if not (given.min() >= checks.SMALLEST and given.max() <= checks.LARGEST):
         first = int(np.argmin((given >= checks.SMALLEST) & (given <= checks.LARGEST)))

@@ -206,9 +206,7 @@ class CollidingRun(BaseRun):
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         place, _v = self._flock.at(self._box.pull, item, self._flock.time(item))
-        now, balls = self._now(), self.state.balls
-        assert balls is not None
-        radius = float(balls.radius[item])
+        now, radius = self._now(), float(self._balls.radius[item])
         return failures.after(self._scene_at(now), moment - span, item, status, place, now, radius)
 
     def collisions(self) -> float:

@@ -48,15 +48,15 @@ class ReactingRun(BaseRun):
         energy = 0.5 * (particles.velocity**2).sum(axis=0) + potential(gravity, vec(particles.position))
         self._source = RandomSource(seeding.signed(), seeding.first)
         self._scenery = self._scenery_of(compiled, 0.0)
-        heat = np.zeros((walls, n)) if any(laws.give_heat for laws in self._scenery.each_laws()) else None
+        births, every = particles.births, self._scenery.each_laws()
+        heat = np.zeros((walls, n)) if any(laws.give_heat for laws in every) else None
+        ends = any(laws.may_end for laws in every)
+        starts = births.time.copy() if births is not None else np.zeros(n) if ends else None
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.asarray(energy) + np.zeros(n), np.zeros(n),
-            np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None, heat,
+            np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None, heat, starts=starts,
+            **none_left(n, compiled.openings() is not None, ends),
         )  # fmt: skip
-        births, ends = particles.births, any(laws.may_end for laws in self._scenery.each_laws())
-        self.state = self.state._replace(**none_left(n, compiled.openings() is not None, ends))
-        if births is not None or ends:
-            self.state = self.state._replace(starts=np.zeros(n) if births is None else births.time.copy())
         self._present = Presence(births, self.state, CHUNK)
         tier = Tier(compile, (self._scenery, gravity), n)
         super().__init__(compiled, method, n, threads, tier, seeding, watched)

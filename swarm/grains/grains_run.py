@@ -29,7 +29,6 @@ from ..run.preflight.counting import counters_of, crossed_of, with_counters
 from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
-from ..scene import Scene
 from ..state import Balls, Floats, State, none_left
 from . import energy, lists, refused
 from . import grain_arrays as arrays
@@ -77,12 +76,10 @@ class GrainsRun(BaseRun):
             spin = np.zeros((3, n))
         feed = None if particles.births is None else Feed(scene, particles, seeding.seed, self._is_clear)
         balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
-        loses = rubs or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
-        ends = laws.may_end
-        loses = loses or laws.may_dissipate or ends
+        openings, ends = self._matter.openings, laws.may_end
         # The energy that contacts store with a wall is lost when the wall becomes absent.
-        openings = self._matter.openings
-        loses = loses or scene.has_doors() or openings is not None
+        loses = rubs or laws.may_dissipate or ends or scene.has_doors() or openings is not None
+        loses = loses or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
             np.zeros((walls * (2 if scene.moves() else 1), n)), np.zeros(n if loses else 0), None,
@@ -119,23 +116,16 @@ class GrainsRun(BaseRun):
         )
         if feed is not None:
             self._feed, self.state = feed, state._replace(born_time=feed.born_time)
-        self._rubs = rubs
         there = np.arange(n) if feed is None else np.flatnonzero(~np.isnan(feed.born_time))
+        at_ends = laws._replace(restitution=None, friction=None)
+        followed = Followed(Passing(state.mass, state.crossed, state.period, self._pages()), None)
         self._world = World(
             self._rows_of(there),
             *self._room(len(there), _PAIRS * n, _AT_WALLS * n, n if self._fields.faces else None), books,
+            followed=None if counters is None else followed,
+            sender=Sender(at_ends, RandomSource(seeding.signed(), seeding.first)) if laws.send_off else None,
+            held=None if holds is None else held_of(state.mass, rubs), heavy=self._heavy,
         )  # fmt: skip
-        if laws.send_off:
-            sender = Sender(
-                laws._replace(restitution=None, friction=None), RandomSource(seeding.signed(), seeding.first)
-            )
-            self._world = self._world._replace(sender=sender)
-        if holds is not None:
-            self._world = self._world._replace(held=held_of(state.mass, rubs))
-        if counters is not None:
-            passing = Passing(state.mass, state.crossed, state.period, self._pages())
-            self._world = self._world._replace(followed=Followed(passing, None))
-        self._world = self._world._replace(heavy=self._heavy)
         self._clock = np.zeros(arrays.CLOCK)
         self._clock[SKIN] = _SKIN * radius.min()
         self._scale, self._stored = 0.0, math.nan
@@ -147,11 +137,6 @@ class GrainsRun(BaseRun):
         """The walls in the frame, or the piece of a frame, that ends at a moment [s]; `skin` is the lists' skin [m]."""
         walls, heavy = self._fields.walls(moment, skin), self._heavy
         return walls if heavy is None else with_heavy(walls, compiled, heavy, self._matter.h)
-
-    def _scene_now(self) -> Scene:
-        """The scene with the walls with a mass at their present places."""
-        seen = self._observed
-        return self._scene if seen is None else self._scene.placed(seen.position, seen.orientation)
 
     def _is_clear(self, place: Floats, radius: float, moment: float) -> bool:
         """Whether a place is clear of the walls with a mass that are present at a moment [s]."""
@@ -171,7 +156,7 @@ class GrainsRun(BaseRun):
         """The rows of particles with these numbers."""
         state, spin = self.state, self.state.spin
         assert state.radius is not None
-        turning = None if spin is None or not self._rubs else spin[:, some]
+        turning = None if spin is None or not self._matter.rubs else spin[:, some]
         made = arrays.grains_of(
             state.position[:, some], state.velocity[:, some], state.radius[some], state.mass[some], turning
         )  # fmt: skip
@@ -316,8 +301,10 @@ class GrainsRun(BaseRun):
         if instant not in self._scene.instants:
             return
         if (came := comers(self._scene, instant)).any():
-            deepest = OUTSIDE * self._scene.finite_size()
-            require_free(self._scene_now(), self._seen_state(), came, deepest, instant, self._first)
+            seen, deepest = self._observed, OUTSIDE * self._scene.finite_size()
+            # The scene with the walls with a mass at their present places.
+            scene = self._scene if seen is None else self._scene.placed(seen.position, seen.orientation)
+            require_free(scene, self._seen_state(), came, deepest, instant, self._first)
         self._stored_before = self._stored_at(self._walls_of(self._compiled, instant, float(self._clock[SKIN])), 0.0)
 
     def _stored_at(self, walls: Any, remaining: float) -> NDArray[np.float64]:

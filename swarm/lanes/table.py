@@ -90,7 +90,7 @@ def table(rows: int) -> NDArray[np.float64]:
     """Rows of numbers that begin with a line of the cache, so that no vector reaches into two of them."""
     size = 8 * rows * STRIDE
     memory = np.zeros(size + _LINE, np.uint8)
-    first = -memory.ctypes.data % _LINE
+    first = -memory.__array_interface__["data"][0] % _LINE
     return memory[first : first + size].view(np.float64).reshape(rows, STRIDE)
 
 

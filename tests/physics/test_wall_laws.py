@@ -287,7 +287,7 @@ def test_a_law_that_sends_a_particle_into_the_wall_ends_the_run(tier):
 
 
 def test_a_speed_away_from_a_moving_wall_may_be_round_off_of_the_velocity_of_the_wall():
-    """A law that adds the wall's velocity to one that is 1e-15 of it sends as many particles into it as away from it."""
+    """A law that adds the velocity of the wall to 1e-15 of it sends some particles into the wall by round-off."""
     one, random, into = Some((Damped(0.5),), 0.0, 1.0), np.random.default_rng(1), 0
     for _try in range(200):
         n, u = (vec(random.normal(size=3)) for _ in range(2))
