@@ -137,8 +137,8 @@ class CompiledScene:
                 f"surfaces must have at most {MOST_WALLS} walls in all{why}, got {walls} of "
                 f"{len(self.scene.surfaces)} surfaces: each wall is compiled into the kernels, which takes minutes "
                 "with so many; remove some (a box has 3 walls, a capped cylinder 2, most others 1), or use solids of "
-                "one kind, of which any number is one field for Impact where nothing moves, and as Spheres and the "
-                "like always"
+                "one kind: any number of them is one field for Impact if nothing moves, and one surface of many "
+                "bodies, such as swarm.Spheres, always is"
             )
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -247,7 +247,7 @@ def _rows(name: str, value: ArrayLike) -> Floats:
     if not (rows.max() <= checks.LARGEST and rows.min() >= -checks.LARGEST):
         good = (np.abs(rows) <= checks.LARGEST).all(axis=0)
         first = int(np.argmin(good))
-        late = "; of a frame of a run with sources take those that are there: .born()" * bool(
+        late = "; in a frame of a run with sources take the particles that are born: .born()" * bool(
             np.isnan(rows[:, first]).all()
         )
         raise SceneError(

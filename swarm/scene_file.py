@@ -173,7 +173,9 @@ def _read(file: Path, table: ParticlesTable | BodiesFile) -> "Particles | Bodies
             return trajectory.frame(frame)
         born = trajectory.frame(frame).born()
         if not len(born):
-            raise SceneError(f"from: no particle is there at frame {frame} of {file}; choose a later one by frame =")
+            raise SceneError(
+                f"from: no particle is in the scene at frame {frame} of {file}; choose a later one by frame ="
+            )
         return born
 
 

@@ -94,7 +94,7 @@ def test_walls_are_as_they_are_at_the_start():
         ({"n": 1, "radius": 0.6}, "radius must leave a place within the walls, which are 1 m apart along x, got 0.6 m"),
         (
             {"radius": 0.4, "fraction": 0.1},
-            "fraction must be that of one ball of the radius 0.4 m or more, 0.2681, got",
+            "fraction must be at least 0.2681, that of one ball of the radius 0.4 m, got",
         ),
         ({"n": 10, "radius": -1.0}, "radius must be a finite number above 0, got -1 for particle 0"),
         ({"n": 0, "radius": 0.1}, "n must be 1 or more, got 0"),

@@ -104,8 +104,8 @@ def _warn_of_turns(bodies: Bodies, dt: float) -> None:
     link, copy = np.unravel_index(int(np.argmax(turns)), turns.shape)
     if turns[link, copy] > _FAR_TURN:
         _LOG.warning(
-            "body %d turns by %.2g rad in a step of %g s (links[%d]): its steps will be cut, which is slow, or say "
-            "little of its motion; use dt = %.1g s or less",
+            "body %d turns by %.2g rad in a step of %g s (links[%d]): its steps will be cut, which is slow, or "
+            "inaccurate; use dt = %.1g s or less",
             copy, turns[link, copy], dt, link, _GOOD_TURN * dt / turns[link, copy],
         )  # fmt: skip
 

@@ -147,7 +147,7 @@ def _require_once(name: str, keys: Iterable[Hashable], names: Sequence[str]) -> 
     found: dict[Hashable, int] = {}
     for k, key in enumerate(keys):
         if found.setdefault(key, k) < k:
-            raise SceneError(f"{name}[{k}]{names[k]} is there already as {name}[{found[key]}]; leave one of them out")
+            raise SceneError(f"{name}[{k}]{names[k]} is listed already as {name}[{found[key]}]; leave one of them out")
 
 
 def each(name: str, rows: Iterable[Any], width: int, parts: str) -> Iterator[tuple[str, tuple[Any, ...]]]:

@@ -131,7 +131,7 @@ def _as_many_as_fit(scene: Scene, radius: float, fraction: float, room: VolumeBo
     count = int(min(fraction / one, 1e15) + _CLOSE)
     if count == 0:
         raise SceneError(
-            f"fraction must be that of one ball of the radius {radius:g} m or more, {one:.4g}, got {fraction:g}; give "
+            f"fraction must be at least {one:.4g}, that of one ball of the radius {radius:g} m, got {fraction:g}; give "
             "a smaller radius, or a larger fraction"
         )
     checks.particles_fit("radius", count)

@@ -87,7 +87,7 @@ def passed(compiled: CompiledScene, method: Penalty, matter: Any, world: Any, st
     wanted = _penalty(method, matter, grains, (i, j), size, MOST_PRESSED * min(radii))
     least = "the radius of the smaller one" if wall < 0 else "its radius"
     return (
-        f"{begin}overlaps {met} by {size:.4g} m, more than {least}, {min(radii):g} m, and what comes after is wrong: "
+        f"{begin}overlaps {met} by {size:.4g} m, more than {least}, {min(radii):g} m, and its further motion is wrong: "
         f"contacts are too soft for the speed; use a penalty of {wanted:.1e} or more{presses}, got {method.penalty:g}, "
         "with a dt that fits it, a smaller speed, or Impact"
     )

@@ -186,8 +186,8 @@ class Session:
             frames, last = len(before), before.times[-1:]
         if not there.start:
             raise SceneError(
-                f"{trajectory} must say of which start it is, to be resumed or found complete, got one of a version "
-                "that did not store it; choose another name, or overwrite it with --overwrite"
+                f"{trajectory} must have the digest of its start, to be resumed or found complete, got one of a "
+                "version that did not store it; choose another name, or overwrite it with --overwrite"
             )
         there.require_same(self._job, trajectory)
         if frames and last[0] >= until:

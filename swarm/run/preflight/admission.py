@@ -109,7 +109,7 @@ def _require_laws_applied(compiled: CompiledScene, method: Method) -> None:
     if numbers.laws is NONE and numbers.laws_at_ends is None:
         raise SceneError(
             f"method must apply the restitution, friction, temperature and laws of walls, got {name}; its numbers "
-            "have no `laws`; leave those of the walls out, use Impact, or give the numbers `laws` and apply them in "
+            "have no `laws`; leave them out of the walls, use Impact, or give the numbers `laws` and apply them in "
             "`contact`, see help(swarm.methods.contract)"
         )
 
@@ -121,7 +121,7 @@ def _require_motions(scene: Scene, until: float) -> None:
             if isinstance(one, Path) and not one.times[0] <= 0.0 <= until <= one.times[-1]:
                 raise SceneError(
                     f"surfaces[{i}].motion.times must cover the run from 0 to {until:g} s, got {one.times[0]:g} to "
-                    f"{one.times[-1]:g}; add what is missing, at rest if the wall is so there, or give another until"
+                    f"{one.times[-1]:g}; add the missing times, or give another until"
                 )
             # A piece of a path counts the time since its start: long after it, float64 does not resolve this run.
             if isinstance(one, Path) and max(t for t in one.times if t <= 0.0) < -_LONG_AGO * until:

@@ -60,9 +60,9 @@ def _require_few_cells(scene: Scene, particles: Particles, options: RunOptions) 
         fastest = particles.fastest() + pull * options.times.until
         if length is not None and not fastest * every / length <= _MOST_CELLS:
             raise SceneError(
-                f"period[{k}] must be so long that particles come through at most {_MOST_CELLS:g} cells a frame where "
-                f"there are counters, which are in each, got {length:g} m for {fastest * every / length:.3g} cells; "
-                "give a longer period, or more frames (every)"
+                f"period[{k}] must be so long that particles come through at most {_MOST_CELLS:g} cells a frame in a "
+                f"run with counters, which are in each cell, got {length:g} m for {fastest * every / length:.3g} "
+                "cells; give a longer period, or more frames (every)"
             )
 
 
@@ -79,8 +79,8 @@ def counters_of(scene: Scene, given: tuple[Counter, ...], logs: bool = False) ->
     walls = sum(len(one.surface.walls()) for one in given if not one.surface.is_field)
     if walls > _MOST:
         raise SceneError(
-            f"counters must have at most {_MOST} walls in all, got {walls}: each is compiled into the kernels; of many "
-            "of one kind make one of many bodies, such as swarm.Spheres"
+            f"counters must have at most {_MOST} walls in all, got {walls}: each is compiled into the kernels; use one "
+            "surface of many bodies, such as swarm.Spheres, in place of many of one kind"
         )
     quiet = 0.0 if scene.period is None and not logs else None
     each = tuple(_counted(scene, f"counters[{k}]", one) for k, one in enumerate(given))

@@ -232,8 +232,8 @@ def warn_of_overlap(scene: Scene) -> None:
     for (i, one), (j, other) in itertools.combinations(bounded, 2):
         if are_there_together(one, other) and _cut_one_another(one, other, boxes[[i, j]]):
             _LOG.warning(
-                "surfaces[%d] (%s) and surfaces[%d] (%s) overlap only in part: particles are kept in what they have in "
-                'common; a vessel of both is one surface, swarm.Union([...]), in a scene file kind = "union"',
+                "surfaces[%d] (%s) and surfaces[%d] (%s) overlap only in part: particles stay in their common "
+                'part; a vessel of both is one surface, swarm.Union([...]), in a scene file kind = "union"',
                 i, type(one).__name__, j, type(other).__name__,
             )  # fmt: skip
             return
