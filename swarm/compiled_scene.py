@@ -53,7 +53,7 @@ class Numbering:
     | surface | the entries of `Scene.surfaces` | the user |
     | part | the simple parts of unions and intersections, `Scene.parts` | surfaces |
     | piece | simple surfaces, `Pieces.each`: a surface or a part, or an image of one | surfaces, images, parts |
-    | row | the units of impulses and heat: a wall, or a field with all its members | walls |
+    | row | the entries of sums of impulses and heat: a wall, or a field with all its members | walls |
     | wall | the walls that a flight meets, each member of a field | kinds: fields, groups, others, unions |
 
     A wall belongs to one row, a row to one piece, and a piece to one surface and at most one part.

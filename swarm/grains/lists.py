@@ -138,7 +138,7 @@ def _depth(wall, r):
 
 @outlined
 def _list_at_wall(wall, grains, near, skin, found):
-    """List the balls near a wall, or all balls if it moves by itself; return how many are listed then."""
+    """List the balls near a wall, or all balls if it has a prescribed motion; return how many are listed then."""
     place, always = grains.place, isinstance(wall, Posed) and not is_heavy(wall)
     for k in range(place.shape[0]):
         i = index(k)

@@ -116,7 +116,7 @@ def gives_work(wall):
 
 
 def _enter(end, m, given):
-    """Insert a member near a ball into the list, in the order of faces, unless it is there; return the list's end."""
+    """Insert a member near a ball into the list, in the order of faces, unless it is listed; return the list's end."""
     members, face, near, (r, skin, begin) = given
     # The distance is exact to first order, and may be off by half.
     if not member(members, index(m)).distance(r) > -2.0 * skin:

@@ -95,7 +95,7 @@ def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], las
 
 
 def _begin_late(left: Floats, remaining: Floats | None, phase: NDArray[np.int8], span: float) -> None:
-    """Mark particles that start at or after the end of the frame, by the time `left` then, as ARRIVED.
+    """Mark particles that start at or after the end of the frame as ARRIVED; `left` is the frame's rest at a start.
 
     Particles that start within the frame fly for the rest of the frame.
     """

@@ -26,7 +26,7 @@ FLIES, GONE, STAYS = Status.DONE.value, -1, -2
 _TOUCH = 1e-9
 # The least speed with which a ball leaves a wall, as a part of its speed: four roundings.
 _PARTS = 2.0**-50
-# The same, at most, where the wall curves away under the ball.
+# The bound of this least speed where the wall curves away under the ball, as a part of the speed.
 _ENOUGH = 0.25
 # A bound exceeded by this factor is exceeded whatever round-off does.
 _SURELY = 1.01
