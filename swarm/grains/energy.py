@@ -15,7 +15,7 @@ from .vessel import met
 
 @long_kernel
 def store_at_walls(matter, walls, remaining, grains, near, into):
-    """Add the energy [J] that the contacts of each ball with walls store when `remaining` [s] of the frame is left."""
+    """Add to `into` the energy [J] that contacts of each ball with walls store with `remaining` [s] left."""
     place = grains.place
     for number, wall in enumerate(walls.at(remaining).each):
         for k in range(near.wall_first[number], near.wall_first[number + 1]):

@@ -125,7 +125,7 @@ class BodyState(NamedTuple):
     sliding: Any  # (n,) [s]
     steps: Any  # (n,)
     sweeps: Any  # (n,) of Uzawa's loop
-    unconverged: Any  # (n,) steps with a loop that did not converge converge
+    unconverged: Any  # (n,) steps with a loop that did not converge
     energy: Any  # (n,) at the start of the run [J]
     free: Any = None  # (K, n) int8, whether a contact point has passed an opening; None without openings
     escape_time: Any = None  # (n,) when the last contact point of a body had passed [s], NaN of bodies inside

@@ -113,7 +113,7 @@ def _blow(bodies, state, name, frame, found, i):
         # The velocity strains links by the order of the scheme; the part of the rate that this causes is left out.
         for row in range(m):
             rate[a] -= blow.answer[a, row] * dot(column(blow.across, 0, row), blow.between(v, row, i))
-        # w+ = -e w- where a wall pushes..
+        # w+ = -e w- where a wall pushes.
         bounced = bounces * touching.restitution[name[a // wide, 1]] if a % wide == 0 else 0.0
         wanted[a] = (1.0 + bounced) * rate[a]
     sweep(touching, (name, p, wide, wide), blow.schur, wanted, p, SWEEPS)

@@ -356,7 +356,7 @@ def show(box, flock, state, end, first, last):
         for axis, cells in enumerate(box.grid.axes()):
             x = r[axis]
             if cells.period is not None:
-                # Round-off at a face may leave the cell. may leave the cell.
+                # Round-off at a face may leave the cell.
                 x = select(x < 0.0, 0.0, select(x >= cells.period, cells.last, x))
             state.position[axis, i] = x
         put(state.velocity, 0, i, v)
