@@ -135,8 +135,8 @@ class CompiledScene:
             why = why if apart is None else f" with {apart}"
             raise SceneError(
                 f"surfaces must have at most {MOST_WALLS} walls in all{why}, got {walls} of "
-                f"{len(self.scene.surfaces)} surfaces: each wall is compiled into the kernels, which takes minutes "
-                "with so many; remove some (a box has 3 walls, a capped cylinder 2, most others 1), or use solids of "
+                f"{len(self.scene.surfaces)} surfaces: each wall is compiled into the kernels, which would "
+                "take minutes; remove some (a box has 3 walls, a capped cylinder 2, most others 1), or use solids of "
                 "one kind: any number of them is one field for Impact if nothing moves, and one surface of many "
                 "bodies, such as swarm.Spheres, always is"
             )

@@ -72,7 +72,7 @@ def test_walls_are_as_they_are_at_the_start():
     packed = swarm.pack(swarm.Scene([shaken]), 12, fraction=0.203, seed=1)
     assert np.array_equal(packed.position, swarm.pack(BOX, 12, fraction=0.203, seed=1).position)
     away = swarm.Box((0.5, 0.5, 0.5), motion=swarm.Path((-1.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.2))))
-    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].motion must leave the wall at 0 s where it is given"):
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].motion must leave the wall at its given place at 0 s"):
         swarm.pack(swarm.Scene([away]), 10, fraction=0.3)
 
 

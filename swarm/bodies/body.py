@@ -114,7 +114,7 @@ class Body:
     cavities: tuple[tuple[Surface, int, int], ...]
     faces: Pairs
 
-    def __init__(  # noqa: PLR0913  # a body is described by what it has; most have few of these
+    def __init__(  # noqa: PLR0913  # most bodies have few of these properties
         self,
         points: ArrayLike,
         mass: ArrayLike | None = None,

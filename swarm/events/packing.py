@@ -178,7 +178,7 @@ def _at_rest(scene: Scene) -> Scene:
         for piece in one.surfaces():
             if piece.motion is not None and not _stays(piece):
                 raise SceneError(
-                    f"surfaces[{i}].motion must leave the wall at 0 s where it is given, got {piece.motion!r:.200}; "
+                    f"surfaces[{i}].motion must leave the wall at its given place at 0 s, got {piece.motion!r:.200}; "
                     "pack a scene without the motion, with the wall where it is then"
                 )
         if one.is_there(0.0):

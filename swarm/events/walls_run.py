@@ -168,7 +168,7 @@ class ReactingRun(BaseRun):
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         before, place = moment - span, self.state.position[:, item]
         message = failures.after(self._scene, before, item, status, place, before + self._queue.time[item])
-        return f"{message}, between walls of which some react"
+        return f"{message}, between walls, some of which react"
 
     def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         rule, part = ReactionRule(0.0, self._watch.passes, 0.0), (0, 0)

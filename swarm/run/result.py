@@ -174,7 +174,7 @@ class Result:
         Raises:
             SceneError: the run has no trajectory, or its file is missing or damaged.
         """
-        path = self._written("frames are", ", or take what is needed of each frame by progress= or observables=")
+        path = self._written("frames are", ", or take the needed arrays of each frame by progress= or observables=")
         from ..files.trajectory import load
         from .sequence import Frames
 
