@@ -101,6 +101,11 @@ REFUSED = {
     "tilted plane": ([TILTED], (1.0, 1.0, None), r"surfaces\[0\] \(Plane\) must be bounded along y"),
     "cavity": ([swarm.Sphere(0.5)], CELL, r"surfaces\[0\] \(Sphere\) must be within the cell, from 0 to 1 along x"),
     "along it": ([CARRIED], CELL, r"surfaces\[0\]\.motion must leave the surface where it is along x"),
+    "turntable": (
+        [swarm.Plane((0.0, 0.0, -1.0), friction=0.2, motion=swarm.Rotation((0.0, 0.0, 1.0), 1.0))],
+        (None, 1.0, None),
+        r"surfaces\[0\]\.motion must not turn a surface that goes on over the faces of the cell along y",
+    ),
     "heavy": ([HEAVY], CELL, r"surfaces\[0\]\.mass and inertia must be None"),
 }
 
@@ -264,7 +269,7 @@ def test_a_trajectory_keeps_images_and_the_cell(job, tmp_path):
             assert (position[:2] < [[0.5], [0.8]]).all()
         # A run goes on from there.
         swarm.simulate(trajectory.scene, end, job.method, until=0.1, compile="never")
-    assert summary.of_trajectory(path)["period"] == "a cell that repeats after 0.5 m along x and 0.8 m along y"
+    assert summary.of_file(path)["period"] == "a cell that repeats after 0.5 m along x and 0.8 m along y"
     with h5py.File(path) as file:
         box = file["particles/all/box"]
         assert list(box.attrs["boundary"]) == ["periodic", "periodic", "none"]

@@ -52,14 +52,14 @@ LASTING = {
 
 
 def test_where_nothing_lasts_there_is_no_word_of_it(path):
-    assert {"sliding", "wall heat"}.isdisjoint(summary.of_trajectory(path))
+    assert {"sliding", "wall heat"}.isdisjoint(summary.of_file(path))
     totals = summary.numbers(path)
     assert [totals[name] for name in YOUNGER] == [0, 0.0, [0.0, 0.0]]
 
 
 def test_sliding_and_wall_heat_are_reported(path):
     observed(path, **LASTING)
-    rows, totals = summary.of_trajectory(path), summary.numbers(path)
+    rows, totals = summary.of_file(path), summary.numbers(path)
     assert rows["sliding"] == "12 at the end, 3.4 s in all"
     assert rows["wall heat"] == "surface 0: 0.75 J, surface 1: -0.5 J"
     assert rows["balance of energy"].startswith("✓ closes to 0 of what moved")
@@ -76,7 +76,7 @@ def test_what_is_dissipated_is_beside_kinetic_energies(tmp_path):
     seen = result.observables
     assert seen["dissipated_energy"][-1] > 10.0 * seen["total_energy"][0]
     text = f"{seen['dissipated_energy'][-1]:.4g} J; the kinetic energy: 1 J, then {seen['kinetic_energy'][-1]:.4g} J"
-    assert summary.of_trajectory(file)["dissipated"] == summary.of_result(result, None)["dissipated"] == text
+    assert summary.of_file(file)["dissipated"] == summary.of_result(result, None)["dissipated"] == text
 
 
 def test_the_drift_of_a_fall_that_begins_near_the_zero_of_its_energy_is_round_off():
@@ -98,7 +98,7 @@ def test_the_work_of_walls_is_reported(tmp_path, path):
     scene, start = swarm.Scene(ends), swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 2.0)
     file = tmp_path / "piston.h5"
     result = swarm.simulate(scene, start, swarm.Impact(), until=1.0, every=0.5, trajectory=file, compile="never")
-    rows, totals = summary.of_trajectory(file), summary.numbers(file)
+    rows, totals = summary.of_file(file), summary.numbers(file)
     assert rows["wall work"] == summary.of_result(result, None)["wall work"] == "surface 1: 3 J"
     assert rows["balance of energy"].startswith("✓ closes to 0 of what moved")
     assert totals["wall_work"] == [0.0, 3.0]
@@ -133,7 +133,7 @@ def test_a_file_of_an_older_version_is_read(path):
     with h5py.File(path, "r+") as file:
         for name in YOUNGER:
             del file[f"observables/{name}"]
-    assert {"sliding", "wall heat"}.isdisjoint(summary.of_trajectory(path))
+    assert {"sliding", "wall heat"}.isdisjoint(summary.of_file(path))
     assert summary.numbers(path)["sliding_time"] == 0.0
     with swarm.load(path) as trajectory:
         assert trajectory.observed().keys().isdisjoint(YOUNGER)
@@ -166,14 +166,14 @@ def test_info_and_the_end_of_a_run_say_whether_it_went_well(tmp_path):
     file = tmp_path / "run.h5"
     scene, start = swarm.Scene([swarm.Sphere(1.0)]), swarm.Particles([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
     result = swarm.simulate(scene, start, swarm.Impact(), until=3.0, trajectory=file, compile="never")
-    rows, printed = summary.of_trajectory(file), summary.of_result(result, None)
+    rows, printed = summary.of_file(file), summary.of_result(result, None)
     assert rows["energy"] == "✓ the balance closes to the last bit"
     assert rows["walls"].startswith("✓ ")
     assert {name: text for name, text in rows.items() if name in printed} | printed == printed
-    assert set(rows) - set(printed) == {"observables", "size"}
+    assert set(rows) - set(printed) == {"observables", "size", "checksums"}
     assert "Sphere(" not in " ".join(rows.values())
     observed(file, energy_error=1e-3)
-    assert summary.of_trajectory(file)["energy"].startswith("✗ not kept")
+    assert summary.of_file(file)["energy"].startswith("✗ not kept")
 
 
 def test_every_printer_reads_one_list(tmp_path, monkeypatch):

@@ -136,7 +136,8 @@ def _of_all(plan: Plan, path: Path, plugins: Iterable[str], threads: int | None)
             options = job.run if threads is None else replace(job.run, threads=threads)
             task = task_of(job.scene, job.start(), job.method, options)
             size += _on_disk(task)
-            seconds += (_in_python if options.compile == "never" else _seconds)(task) - _BEGINNING + _NEXT
+            _loads, compiled, python = _work(task)
+            seconds += (python if options.compile == "never" else compiled) - _BEGINNING + _NEXT
     share = len(plan.variants) / len(some)
     most = "at most " * (task.options.storage.compression != "none")
     every = f"about {_about(seconds * share)} one after the other, besides {_BEGINNING:g} s to begin and what compiles"
@@ -215,9 +216,8 @@ def _there(path: Path, what: str) -> str:
 
 def _time(task: Task) -> dict[str, str]:
     """About how long the run takes, from the flights at its start and the costs of `bench/results`."""
-    loads, options = _loads(task), task.options
+    (loads, seconds, python), options = _work(task), task.options
     threads = options.thread_count()
-    python, seconds = _in_python(task), _seconds(task)
     compiling = _COMPILING if task.bodies is None else _COMPILING_BODIES
     work = " and ".join(f"{many(float(f'{one.events:.2g}'))} {one.noun}" for one in loads)
     stated = {"work": f"about {work}"} if work else {}
@@ -234,21 +234,13 @@ def _time(task: Task) -> dict[str, str]:
     return stated | {"time": f"about {_about(seconds)}{on}{once}{more}; from the start, to a factor of a few"}
 
 
-def _of_frames(task: Task) -> float:
-    """The time of the beginning, the end and the frames of a run [s]."""
-    n, options = len(task.particles), task.options
-    return _BEGINNING + options.times.count * (_SEEN * n + options.storage.bytes_of(n) / _WRITTEN)
-
-
-def _in_python(task: Task) -> float:
-    """The time of a run in plain Python [s]."""
-    return _of_frames(task) + sum(one.events * one.plain for one in _loads(task))
-
-
-def _seconds(task: Task) -> float:
-    """The time of a run with compiled kernels [s]."""
-    threads = task.options.thread_count()
-    return _of_frames(task) + sum(one.events * one.cost / (threads if one.shared else 1) for one in _loads(task))
+def _work(task: Task) -> tuple[list[Workload], float, float]:
+    """The work of a run, and its time with compiled kernels and in plain Python [s]."""
+    n, options, loads = len(task.particles), task.options, _loads(task)
+    threads = options.thread_count()
+    frames = _BEGINNING + options.times.count * (_SEEN * n + options.storage.bytes_of(n) / _WRITTEN)
+    compiled = sum(one.events * one.cost / (threads if one.shared else 1) for one in loads)
+    return loads, frames + compiled, frames + sum(one.events * one.plain for one in loads)
 
 
 def _about(seconds: float) -> str:

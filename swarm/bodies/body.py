@@ -19,7 +19,7 @@ from ..errors import SceneError
 from ..motion import Motion
 from ..state import Floats
 from ..surfaces.surface import Surface
-from . import checked, holding, room, tied
+from . import algebra, checked, holding, room, tied
 from .checked import Pairs, Spring
 
 
@@ -179,7 +179,7 @@ class Body:
         """The inverse (P, P) of the mass matrix of the points that can move; 0 at anchored points."""
         free = np.setdiff1d(np.arange(len(self)), list(self.anchors))
         inverse = np.zeros((len(self), len(self)))
-        inverse[np.ix_(free, free)] = np.linalg.inv(self.mass_matrix[np.ix_(free, free)])
+        inverse[np.ix_(free, free)] = algebra.inverse(self.mass_matrix[np.ix_(free, free)])
         return inverse
 
 

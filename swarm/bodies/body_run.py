@@ -223,8 +223,9 @@ class BodyRun(BaseRun):
         if status == Status.UNCONVERGED:
             method: Any = self._method
             return sentence + (
-                f"{method.max_sweeps} sweeps of a step left V above tolerance = {method.tolerance:g} J. The loop "
-                'converges from the surface: use adaptive=True, a larger penalty, or on_unconverged="count"'
+                f"{method.max_sweeps} sweeps of a step left V above tolerance = {method.tolerance:g} J; take a "
+                "larger penalty (a shorter dt needs one that grows as 1/dt^2), more max_sweeps, or "
+                'on_unconverged="count", which accepts such a step with its error of the energy'
             )
         return sentence + (
             "a point meets its walls without end, as in a cusp; start it elsewhere, or take a shorter dt"

@@ -5,12 +5,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..common import checks
 from ..errors import SceneError
-from ..kernel.limits import EPSILON, TINY
+from ..kernel.limits import TINY
 from ..motion import led
 from ..particles import Births, Particles, TiedParticles
 from ..scene import Scene
 from ..state import Floats
 from . import checked, holding
+from .algebra import solved
 from .body import Body
 from .checked import Pairs
 from .tied import Tie, ties
@@ -251,30 +252,10 @@ def projected(body: Body, position: Floats, velocity: Floats) -> Floats:
         system = coupling[:, :, None] * sum(normal[:, None, axis] * normal[:, axis] for axis in range(3))
         for _correction in range(_CORRECTIONS):
             speeds = np.array([_speed(tie, made[:, :, some]) for tie in held])
-            force = unit[:, None] * _solved(system, unit[:, None] * speeds)
+            force = unit[:, None] * solved(system, unit[:, None] * speeds)
             for one, way, share in zip(force, normal, pushed, strict=True):
                 made[:, :, some] -= (one * way)[:, None] * share[:, None]
     return made
-
-
-def _solved(system: Floats, wanted: Floats) -> Floats:
-    """Return the solutions (m, n) of n symmetric systems (m, m, n) with diagonals of 1; 0 in a dependent row.
-
-    This is not done by LAPACK, as the last bit would depend on the processor.
-    """
-    upper, x, rows = system.copy(), wanted.copy(), len(wanted)
-    least = 8.0 * rows * EPSILON
-    for k in range(rows):
-        pivot = np.where(upper[k, k] > least, upper[k, k], np.inf)
-        below = k + 1 + np.flatnonzero(upper[k, k + 1 :].any(axis=1))
-        part = upper[k, below] / pivot
-        upper[np.ix_(below, below)] -= part[:, None] * upper[k, below]
-        x[below] -= part * x[k]
-        upper[k, below], x[k] = part, x[k] / pivot
-    for k in reversed(range(rows)):
-        for later in k + 1 + np.flatnonzero(upper[k, k + 1 :].any(axis=1)):
-            x[k] -= upper[k, later] * x[later]
-    return x
 
 
 def _speed(tie: Tie, velocity: Floats) -> Floats:

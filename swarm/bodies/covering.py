@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from ..state import Floats
-from . import room
+from . import algebra, room
 from .body import Body
 from .checked import Pairs
 
@@ -41,7 +41,7 @@ def points(corners: Floats, triangles: Pairs, spacing: float) -> Floats:
         found.append((1.0 - share) * corners[i] + share * corners[j])
     for triangle, parts in zip(triangles, across.astype(int).tolist(), strict=True):
         inside = [(a, b, parts - a - b) for a in range(1, parts) for b in range(1, parts - a)]
-        found.append(np.array(inside, dtype=float).reshape(-1, 3) / parts @ corners[triangle])
+        found.append(algebra.product(np.array(inside, dtype=float).reshape(-1, 3) / parts, corners[triangle]))
     return np.concatenate(found)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from ..common import checks
 from ..errors import SceneError
 from ..state import Floats
-from . import checked, room
+from . import algebra, checked, room
 from .body import Body, Strain
 from .checked import Pairs
 
@@ -96,7 +96,7 @@ def block(lengths: Sequence[float], cells: Sequence[int]) -> tuple[Floats, Pairs
     elements = []
     for order in itertools.permutations(range(3)):
         corners = np.concatenate([[0], np.cumsum(steps[list(order)])])
-        if np.linalg.det(np.eye(3)[list(order)]) < 0.0:
+        if algebra.determinants(np.eye(3)[list(order)]) < 0.0:
             corners = corners[[0, 2, 1, 3]]
         elements.append(first[:, None] + corners)
     return nodes, np.concatenate(elements)
@@ -113,7 +113,7 @@ def _checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Floats, Pairs, Floats]:
     for k in sorted(set(range(len(nodes))) - set(elements.ravel().tolist())):
         raise SceneError(f"nodes[{k}] must belong to an element, got one without; it has no mass: leave it out")
     corners = nodes[elements]
-    volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0
+    volumes = algebra.determinants(corners[:, 1:] - corners[:, :1]) / 6.0
     longest = (_edge_vectors(corners) ** 2).sum(axis=2).max(axis=1) ** 1.5
     for k in np.flatnonzero(np.abs(volumes) <= _FLAT * longest)[:1]:
         raise SceneError(
@@ -142,14 +142,18 @@ def _masses(elements: Pairs, masses: Floats, count: int, consistent: bool) -> Fl
 
 
 def _strain(nodes: Floats, elements: Pairs, volumes: Floats, young: float, poisson: float) -> Strain:
-    vectors = _edge_vectors(nodes[elements])
-    # s - s0 = 2 X.E X as a product with the six components of E.
-    to_squares = 2.0 * _TIMES * vectors[:, :, _ROWS] * vectors[:, :, _COLUMNS]
-    to_strain = np.linalg.inv(to_squares)
+    # The gradients b of barycentric coordinates give E = -sum over edges (s - s0) (b_i b_j^T + b_j b_i^T)/4, as
+    # |sum l_i X_i|^2 = -sum over edges l_i l_j s_ij for numbers l that add up to 0.
+    corners = nodes[elements]
+    sides = corners[:, 1:] - corners[:, :1]
+    gradients = np.cross(sides[:, (1, 2, 0)], sides[:, (2, 0, 1)]) / (6.0 * volumes)[:, None, None]
+    gradients = np.concatenate([-gradients.sum(axis=1, keepdims=True), gradients], axis=1)
+    first, second = (gradients[:, _EDGES[:, k]].transpose(0, 2, 1) for k in (0, 1))
+    to_strain = -0.25 * (first[:, _ROWS] * second[:, _COLUMNS] + first[:, _COLUMNS] * second[:, _ROWS])
     shear = young / (2.0 * (1.0 + poisson))
     law = np.diag(2.0 * shear * _TIMES)
     law[:3, :3] += young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
-    stiffness = volumes[:, None, None] * (to_strain.transpose(0, 2, 1) @ law @ to_strain)
+    stiffness = volumes[:, None, None] * np.einsum("tia,ij,tjb->tab", to_strain, law, to_strain)
     pairs = np.sort(elements[:, _EDGES], axis=2).reshape(-1, 2)
     edges, number = np.unique(pairs, axis=0, return_inverse=True)
     number = number.reshape(-1, 6)

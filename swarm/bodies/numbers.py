@@ -11,6 +11,7 @@ from ..methods.base import Method
 from ..run.starting_state import UNSEEDED, Seeding
 from ..state import Floats
 from ..surfaces.surface import Surface
+from . import algebra
 from .body import Body
 from .checked import Pairs
 from .lanes.body_arrays import Ties, Touching
@@ -34,13 +35,13 @@ def ties_of(body: Body, penalty: float | None = None) -> Ties:
     compliance: Floats = np.zeros((edges, edges))
     if body.strain is not None:
         rest[links + springs :] = body.strain.rest
-        compliance = np.asarray(2.0 * np.linalg.inv(body.strain.stiffness), dtype=np.float64)
+        compliance = 2.0 * algebra.inverse(body.strain.stiffness)
     is_free = np.ones(len(body), np.bool_)
     is_free[list(body.anchors)] = False
     inverse = body.inverse_mass()
     is_diagonal = bool((inverse == np.diag(np.diag(inverse))).all())
     rows = np.concatenate([_differences(ends, len(body)), _combinations(body)])
-    couplings = rows @ inverse @ rows.T
+    couplings = algebra.product(rows, algebra.product(rows, inverse).T)
     ties = len(ends)
     held = [*range(ties), *range(ties + len(body.contacts), ties + len(body.contacts) + len(body.guides))]
     filled = couplings[np.ix_(held, held)] != 0.0
@@ -109,6 +110,6 @@ def touching_of(body: Body, ties: Ties, compiled: CompiledScene, seeding: Seedin
     laws = compiled.laws if compiled.laws is not None and compiled.laws.send_off else None
     random = None if laws is None else RandomSource(seeding.signed(), seeding.first)
     return Touching(
-        b, plain, b @ ties.inverse_mass, len(body.contacts), len(of_walls), len(body.guides),
+        b, plain, algebra.product(b, ties.inverse_mass), len(body.contacts), len(of_walls), len(body.guides),
         restitution, friction, laws is not None or bool(((restitution < 1.0) | (friction > 0.0)).any()), laws, random,
     )  # fmt: skip

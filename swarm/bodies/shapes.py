@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from ..common import checks
 from ..errors import SceneError
 from ..state import Floats
-from . import checked, covering, room
+from . import algebra, checked, covering, room
 from .body import Body
 from .checked import Pairs
 
@@ -121,16 +121,18 @@ def rigid(
     density = checks.positive("density", density)
     triangles = _hull(corners) if faces is None else _closed(corners, faces)
     volume, center, moment = _moments(corners, triangles)
-    squares, axes = np.linalg.eigh(moment)
-    if not squares[0] > _FLAT**2 * squares[2]:
+    squares, axes = algebra.modes_of_three(moment)
+    if not squares.min() > _FLAT**2 * squares.max():
         raise _flat(corners)
-    base = center + _CORNERS @ ((axes * np.sqrt(squares)) @ axes.T)
+    root, inverse = (algebra.product(axes * scales, axes.T) for scales in (np.sqrt(squares), 1.0 / np.sqrt(squares)))
+    base = center + algebra.product(_CORNERS, root)
     touching = np.concatenate([corners, _between(corners, triangles, contacts)])
-    # The weights of the base points, which add up to 1, for each contact point.
-    weights = np.linalg.solve(
-        np.vstack([(base - center).T, np.ones(4)]), np.vstack([(touching - center).T, np.ones(len(touching))])
-    )
-    return Body(base, density * volume / 4.0, links=_ALL_PAIRS, contacts=weights.T, faces=triangles.tolist())
+    # The weights of the base points, which add up to 1, for each contact point; weights of 1/4 give the centre.
+    weights = np.full((len(touching), 4), 0.25)
+    for _improvement in range(2):
+        missing = touching - algebra.product(weights, base)
+        weights += 0.25 * algebra.product(algebra.product(missing, inverse), _CORNERS.T)
+    return Body(base, density * volume / 4.0, links=_ALL_PAIRS, contacts=weights, faces=triangles.tolist())
 
 
 def _between(corners: Floats, triangles: Pairs, contacts: ArrayLike | None) -> Floats:
@@ -196,7 +198,7 @@ def _moments(corners: Floats, triangles: Pairs) -> tuple[float, Floats, Floats]:
     """Return volume, centroid, and second moment about it per volume (3, 3), from the tetrahedra of the triangles."""
     middle = corners.mean(axis=0)
     sides = (corners - middle)[triangles]
-    volumes = np.linalg.det(sides) / 6.0
+    volumes = algebra.determinants(sides) / 6.0
     volume, sums = float(volumes.sum()), sides.sum(axis=1)
     if abs(volume) <= _EMPTY * np.ptp(corners, axis=0).max() ** 3:
         raise _flat(corners)
@@ -205,6 +207,6 @@ def _moments(corners: Floats, triangles: Pairs) -> tuple[float, Floats, Floats]:
             f"faces must be anticlockwise seen from outside, got a volume of {volume:g} m^3; reverse every face"
         )
     # For a tetrahedron with a corner at 0, the integral of x is V/4 sum a, of x x^T V/20 (sum a a^T + sum a sum a^T).
-    center = volumes @ sums / (4.0 * volume)
+    center = (volumes[:, None] * sums).sum(axis=0) / (4.0 * volume)
     squares = np.einsum("f,fax,fay->xy", volumes, sides, sides) + np.einsum("f,fx,fy->xy", volumes, sums, sums)
     return volume, middle + center, squares / (20.0 * volume) - np.outer(center, center)

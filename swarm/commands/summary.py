@@ -64,14 +64,6 @@ def of_file(file: Path) -> dict[str, str]:
         return facts.of_log(log) | facts.of_checksums(log)
 
 
-def of_trajectory(file: Path) -> dict[str, str]:
-    """The content of a trajectory, and whether the run went well."""
-    from ..files.trajectory import load
-
-    with load(file) as trajectory:
-        return facts.of_trajectory(trajectory)
-
-
 def of_recording(file: Path, repair: bool) -> dict[str, str]:
     """The content of a recording; `repair` repairs it first."""
     from ..common.extras import needed_by

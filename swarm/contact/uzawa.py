@@ -48,9 +48,9 @@ def has_limit(surface, law, r):
     return (impulse.start_of(0.0, surface, r).gap == 0.0) & (law.constraint_gradient(0.0) > 0.0)
 
 
-def stored(surface, law, r):
-    """V at r, where a step starts."""
-    return law.stored_energy(impulse.start_of(0.0, surface, r).gap)
+def is_outside(surface, r):
+    """Whether a point is outside of a surface, by more than round-off."""
+    return impulse.start_of(0.0, surface, r).gap > 0.0
 
 
 def multiplier_of(surface, law, r, c, kappa):

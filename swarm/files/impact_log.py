@@ -221,6 +221,7 @@ class ImpactLog(Stored):
 
             A contact of a point with a soft wall has its row where it ends too, with the whole impulse of that wall.
             One that laws do not end, as the wall leaves or another wall absorbs the point, has the same velocity twice.
+            The observable "impacts" counts it where it begins: it is the number of rows and of contacts that last.
 
             In a run with counters a crossing is a row too, with an impulse of 0 and the velocity at the crossing twice:
             `counter` is the place of the counter in `counters` and `sense` 0 out of its admissible side, 1 back, and

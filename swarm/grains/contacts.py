@@ -210,11 +210,16 @@ def _note(rows, c, a, b, k):
     rows[c, col.ONE], rows[c, col.OTHER], rows[c, col.PLACE] = a, b, k
 
 
+def move_of(matter, grains, i):
+    """Return the move of a ball in the step."""
+    return 0.5 * matter.h * (vector_at(grains.speed, i, col.BEFORE) + vector_at(grains.speed, i, col.AFTER))
+
+
 def foresee(matter, grains, course, i):
     """Write the course of a ball in the step, from its velocities at both ends."""
-    place, speed = grains.place, grains.speed
+    place = grains.place
     set_vector(course, i, col.FROM, vector_at(place, i, col.X))
-    set_vector(course, i, col.MOVE, 0.5 * matter.h * (vector_at(speed, i, col.BEFORE) + vector_at(speed, i, col.AFTER)))
+    set_vector(course, i, col.MOVE, move_of(matter, grains, i))
     course[i, col.EXTENT], course[i, col.YIELDING] = place[i, col.RADIUS], place[i, col.LIGHTNESS]
 
 

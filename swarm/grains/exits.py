@@ -18,10 +18,9 @@ from ..lanes.watching.log import Struck
 from ..surfaces.periodic.period import into
 from ..surfaces.presence.openings import is_open
 from . import grain_arrays as col
-from .contacts import apart
+from .contacts import apart, move_of
 from .grain_arrays import vector_at
 from .heavy_walls import place_on
-from .overlaps import move_of
 from .vessel import met, met_member
 
 

@@ -20,7 +20,7 @@ from ..surfaces.fields.members import member
 from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
 from . import grain_arrays as col
-from .contacts import apart
+from .contacts import apart, move_of
 from .grain_arrays import vector_at
 from .heavy_walls import is_heavy, now
 from .vessel import is_of_faces, met, moves
@@ -36,11 +36,6 @@ class Limits(Record):
     overlap: float  # [m]
     move: float  # [m]
     longest: Any  # the longest move that cannot jump over a solid [m], or None in a scene without solids
-
-
-def move_of(matter, grains, i):
-    """The move of a ball in the step."""
-    return 0.5 * matter.h * (vector_at(grains.speed, i, col.BEFORE) + vector_at(grains.speed, i, col.AFTER))
 
 
 def _note(failed, ball, other, wall, size):

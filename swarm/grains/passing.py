@@ -7,8 +7,8 @@ from ..kernel.jit import Array, outlined
 from ..lanes.watching.crossings import ParticleMoment
 from ..surfaces.periodic.period import has_left, into
 from . import grain_arrays as col
+from .contacts import move_of
 from .grain_arrays import vector_at
-from .overlaps import move_of
 
 
 class Passing(NamedTuple):

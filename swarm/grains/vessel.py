@@ -24,6 +24,7 @@ from ..surfaces.outlines.round_side import RoundSide
 from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
 from . import grain_arrays as col
+from .contacts import move_of
 from .grain_arrays import vector_at
 from .heavy_walls import is_heavy
 
@@ -176,17 +177,11 @@ class SweptWall(Record):
 @outlined
 def sweep_of(field, listed, matter, grains, skin):
     """Return the `SweptWall` of all balls near a moving field in a step; `listed` is the field when lists were made."""
-    place, speed, half, grid, found = (
-        grains.place,
-        grains.speed,
-        0.5 * matter.h,
-        members_of(field).grid,
-        SweptWall(0.0, 0.0),
-    )
+    place, grid, found = grains.place, members_of(field).grid, SweptWall(0.0, 0.0)
     for k in range(place.shape[0]):
         i = index(k)
         r, reach = vector_at(place, i, col.X), place[i, col.RADIUS] + 2.0 * skin
-        end = field.own_end(r + half * (vector_at(speed, i, col.BEFORE) + vector_at(speed, i, col.AFTER)))
+        end = field.own_end(r + move_of(matter, grains, i))
         corner = Vec(reach, reach, reach)
         along = block_of(grid, end - corner, end + corner).along
         if (along.x > 0) & (along.y > 0) & (along.z > 0):

@@ -17,7 +17,7 @@ from ..methods import contract as methods
 from ..surfaces.in_motion.moving import Aimed, Carried
 from ..surfaces.time_of_impact import aim
 from .accounts import add_to_rows, add_work
-from .contact_ends import end_contacts, end_hard_contacts, impulses_before
+from .contact_ends import count_hard_contacts, counts_by_impulse, end_contacts, end_hard_contacts, impulses_before
 from .escape import face_lanes, let_out_lanes, step_out, step_out_lanes
 from .flight import aims, go
 from .hit_member import of_lane, pick, picks
@@ -155,6 +155,7 @@ def _hard_passes(hard, method, walls, gravity, share, lanes, live):
             _put_contact(method, lanes, i, contact)
             _count_contacts(method, share, lanes, i, i + 1)
             if status == Status.DONE.value:
+                count_hard_contacts(method, walls, share, lanes, i, lane, kept)
                 end_hard_contacts(method, walls, gravity, share, lanes, i, lane.v, kept)
                 if lanes.stand is not None:
                     step_out(method, walls, share, lanes, i)
@@ -242,7 +243,8 @@ def _put_contact(method, lanes, i, contact):
     """Write a contact into its lane: place, velocity, impacts, energy. Returns whether the lane has arrived."""
     lane = lanes.lane(i)
     lane.put_end(contact)
-    lane.hits += contact.hits
+    if not counts_by_impulse(method):
+        lane.hits += contact.hits
     if method.dissipates:
         lane.twice = contact.twice_energy
     lanes.marked[i] = contact.lasts | (not (contact.remaining > 0.0))

@@ -25,11 +25,16 @@ from ..kernel.gravity import potential
 from ..kernel.jit import outlined, select
 from ..kernel.vector import dot, norm, square
 from .accounts import add_work
-from .escape import detain, foot_on, leave_contacts, wall_of_row
+from .escape import cut_contact, detain, foot_on, leave_contacts, wall_of_row
 from .watching.log import Struck
 
 # Of its speed before a step, what friction leaves by round-off of a particle that it stops.
 _STOPPED = 1e-9
+
+
+def counts_by_impulse(method):
+    """Whether a contact counts as an impact where its impulse begins; else its method says so, by the gap."""
+    return method.steps_into_walls and method.laws_at_ends is not None
 
 
 def end_contacts(method, walls, gravity, share, lanes, i, before, pushed):
@@ -40,14 +45,18 @@ def end_contacts(method, walls, gravity, share, lanes, i, before, pushed):
     if method.laws_at_ends is None:
         return
     wall, impulse = pushed
-    if impulse > 0.0:
-        share.state.pressed[index(walls.row(wall)), index(lanes.particle[i])] += impulse
-        _end(method, walls, gravity, share, lanes, i, before, wall)
+    if wall >= 0.0:
+        state, row, p = share.state, index(walls.row(wall)), index(lanes.particle[i])
+        if counts_by_impulse(method) and impulse > 0.0 and not _lasts(state, row, p):
+            lanes.lane(i).hits += 1.0
+        state.pressed[row, p] += impulse
+        if _lasts(state, row, p):
+            _end(method, walls, gravity, share, lanes, i, before, wall)
 
 
 def impulses_before(method, walls, lanes, i):
     """The impulses of the walls on a lane before its hard pass."""
-    if method.laws_at_ends is None:
+    if method.laws_at_ends is None and not method.steps_into_walls:
         return None
     kept = scratch(walls.length(), np.float64)
     for s in range(walls.length()):
@@ -55,18 +64,42 @@ def impulses_before(method, walls, lanes, i):
     return kept
 
 
+def count_hard_contacts(method, walls, share, lanes, i, start, kept):
+    """Count the contacts that begin in a hard pass of steps into walls; the lane was `start` before."""
+    if not method.steps_into_walls:
+        return
+    flier, p, faced = lanes.lane(i), index(lanes.particle[i]), lanes.faced(walls, i)
+    before, after = method.at_start(faced, start.remaining), method.at_start(faced, flier.remaining)
+    for s in range(walls.length()):
+        wall, pushes = wall_of_row(walls, s, start.r), lanes.impulse[s, i] > kept[s]
+        if counts_by_impulse(method):
+            begins = pushes and not _lasts(share.state, s, p)
+        else:
+            # The midpoint rule may end outside before it feels a force.
+            begins = pushes or method.is_outside(after, wall, flier.r)
+            begins = begins and not method.is_outside(before, wall, start.r)
+        if begins:
+            flier.hits += 1.0
+            if share.counts is not None:
+                share.counts.add(wall, 1.0)
+
+
 def end_hard_contacts(method, walls, gravity, share, lanes, i, before, kept):
     """`end_contacts` with all walls after a hard pass."""
     if method.laws_at_ends is None:
         return
-    pressed, p = share.state.pressed, index(lanes.particle[i])
+    state, p = share.state, index(lanes.particle[i])
     for s in range(walls.length()):
-        kept[s] = lanes.impulse[s, i] - kept[s]
-        pressed[s, p] += kept[s]
+        state.pressed[s, p] += lanes.impulse[s, i] - kept[s]
     for s in range(walls.length()):
         # One that absorbs the particle ends its other contacts.
-        if kept[s] > 0.0 and pressed[s, p] > 0.0:
+        if _lasts(state, s, p):
             _end(method, walls, gravity, share, lanes, i, before, wall_of_row(walls, s, lanes.lane(i).r))
+
+
+def _lasts(state, row, p):
+    """Whether a particle is in a contact with the wall of a row, which has given it an impulse."""
+    return state.pressed[row, p] + state.rubbed[row, p] > 0.0
 
 
 @outlined
@@ -77,13 +110,18 @@ def _end(method, walls, gravity, share, lanes, i, before, wall):
     r = foot_on(now, wall, flier.r)
     n, u = now.unit_normal(wall, r), wall_velocity(method.moving, now, wall, r)
     away, pressed = -dot(relative(u, v), n), state.pressed[row, p]
-    if now.distance(wall, flier.r) > 0.0 and (away <= 0.0 or method.lasts_outside(now, wall, flier.r)):
+    if method.is_outside(now, wall, flier.r):
         if away <= _STOPPED * norm(before) and dot(relative(u, before), n) < 0.0:
             # In a contact that a weight makes last, friction acts each time that the particle turns back, and where
             # friction at another wall stops it.
             state.rubbed[row, p] += pressed
             state.pressed[row, p] = 0.0
             _drag(method, walls, share, lanes, i, (wall, n, u, pressed))
+        return
+    if away <= 0.0 and not method.steps_into_walls:
+        # A loop that has not converged has left it on its way out: the next step is another contact.
+        _drag(method, walls, share, lanes, i, (wall, n, u, pressed))
+        cut_contact(method, now, share, lanes, i, row)
         return
     whole = state.rubbed[row, p] + pressed
     state.pressed[row, p] = state.rubbed[row, p] = 0.0
@@ -135,8 +173,10 @@ def _send(method, walls, now, gravity, share, lanes, i, at):
     apart = v + x * n
     before = apart + 2.0 * c * n
     turned = given(u, apart - before)
-    # Of the impacts before this one, which has been counted.
+    # Of the contacts that have ended before this one: all that were counted but this one and those that last.
     number = state.impacts[p] + np.int64(flier.hits) - 1
+    for s in range(walls.length()):
+        number -= np.int64(_lasts(state, s, p))
     random = RandomSource(share.seed, share.first).of_impact(p, number, laws)
     arriving = Arriving(r, before, square(before) + 2.0 * potential(gravity, r), mass)
     bounce = impact_on_wall(laws._replace(friction=None), now, gravity, wall, arriving, random)

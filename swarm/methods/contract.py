@@ -265,6 +265,7 @@ class MethodNumbers(Record):
     def hard_pass(self, walls, gravity, lane, wall, lanes, i):
         """The `Contact` that `flight` or `contact` left to this function, and its status.
 
-        Adds to `lanes.impulse[wall, i]`, and writes the sweeps of a multiplier loop into `lanes.record[:, i]`.
+        Adds to `lanes.impulse[wall, i]`, and writes the sweeps of a multiplier loop into `lanes.record[:, i]`. In a
+        method of steps into walls it has no new impacts: these are counted from the impulses of all walls.
         """
         return refused(lane, Status.STALLED.value)

@@ -333,9 +333,9 @@ class Steps(contract.MethodNumbers):
         """The work of a force of this wall in a step with these walls and ends, r0 and r1; 0 where no wall moves."""
         return 0.0 if self.moving is None else dot(force, over.swept(wall, *ends))
 
-    def lasts_outside(self, walls, wall, r):
-        """Whether the contact of a particle that leaves its wall, outside of it at r, goes on in the next step."""
-        return True
+    def is_outside(self, walls, wall, r):
+        """Whether a point is outside of a wall: the contact of a step that ends there goes on in the next one."""
+        return walls.of(wall, False, _is_outside, r)
 
     def flight(self: Any, walls, gravity, lane, hit=None):
         """Over the steps that surely stay free, to one that touches a wall: HARD where a lane cannot take it alone."""
@@ -409,12 +409,15 @@ class SoftNumbers(Steps):
         if self.is_too_fast(displacement(gravity, lane.v, self.dt)):
             return contract.refused(lane, Status.TOO_FAST.value)
         step = self.careful_step(walls, gravity, lane, lanes.impulse, i)
-        new = select(self.at_start(walls, lane.remaining).outside(-1.0, lane.r), 0.0, 1.0)
         status = Status.DONE.value if step.solved else Status.UNSOLVED.value
         if self._passes_any(walls, lane, step.r, step.v):
             return contract.refused(lane, Status.TOO_DEEP.value)
         twice_energy = lane.own.twice_energy + 2.0 * step.work
-        return contract.Contact(step.r, step.v, lane.remaining - 1.0, 0.0, 0.0, new, twice_energy, False), status
+        return contract.Contact(step.r, step.v, lane.remaining - 1.0, 0.0, 0.0, 0.0, twice_energy, False), status
+
+
+def _is_outside(surface, r):
+    return surface.level_of(surface.inner(r)) > 0.0
 
 
 # --- The contact -----------------------------------------------------------------------------------------
@@ -427,7 +430,7 @@ class Taken(NamedTuple):
     v: Vec
     solved: bool
     impulse: float
-    new: bool  # whether it starts an impact
+    new: bool  # whether it starts an impact: it is inside of its wall
     work: float
 
 

@@ -56,10 +56,6 @@ class StepNumbers(penalty.GradientSteps):
         """That of the scene [m]."""
         return self.shortest_length / base.SHORTEST
 
-    def is_new(self, walls, r):
-        """Whether a contact step starts with an impact."""
-        raise NotImplementedError
-
     def is_alone(self, met, after, start, r1, kappa):
         """Whether no other wall than the one that is `met` (walls, number) has a part in the step from `start` to r1.
 
@@ -142,7 +138,7 @@ class StepNumbers(penalty.GradientSteps):
         solved = alone & (not solution.unsolved) & end.over.pushes(number, kappa)
         touching = wall >= 0.0
         step = (lane.remaining > 0.0) & touching & solved
-        new = step & self.is_new(end.over, lane.r)
+        new = step & (not self.is_outside(end.over, wall, lane.r))
         work = select(step, end.work, 0.0)
         # A step without contact: only fixed steps end here that way, just before one.
         loose = (lane.remaining > 0.0) & (wall > contract.HARD) & (not touching)
@@ -178,7 +174,8 @@ class StepNumbers(penalty.GradientSteps):
             return self.as_impacts(walls, lane, cut, wall, lanes, i)
         if not end.converged and (self.policy == RAISE or not end.solved):
             return contract.refused(lane, Status.UNCONVERGED.value if end.solved else Status.UNSOLVED.value)
-        new = 1.0 if self.is_new(over, start.r) else 0.0
+        # Contacts of steps into walls are counted where the impulses of all walls are known.
+        new = 0.0 if self.steps_into_walls else 1.0
         pushed = self.reacted(held, gravity, start, h, end.r, reactions, lanes.impulse, i)
         remaining, twice_energy = start.remaining - cut.used, start.own.twice_energy + 2.0 * pushed.work
         contact = contract.Contact(pushed.r, pushed.v, remaining, wall, 0.0, new, twice_energy, False)
@@ -201,15 +198,12 @@ def _after(r, v, remaining, hits):
 class FixedSteps(StepNumbers):
     """The method with steps of fixed length."""
 
-    def is_new(self, walls, r):
-        return not walls.outside(-1.0, r)
-
     def is_alone(self, met, after, start, r1, kappa):
         return not after.outside(met[1], r1)
 
-    def lasts_outside(self, walls, wall, r):
-        # From where a loop that has not converged has left it, the next step pushes it again.
-        return walls.of(wall, 0.0, uzawa.stored, self.law, r) > self.tolerance
+    def is_outside(self, walls, wall, r):
+        # From there the next step pushes it again, whether the loop of this one has converged or not.
+        return walls.of(wall, False, uzawa.is_outside, r)
 
     @outlined
     def as_impacts(self, walls, lane, cut, wall, lanes, i):
@@ -217,20 +211,19 @@ class FixedSteps(StepNumbers):
             # Refused before the run.
             return contract.refused(lane, Status.UNCONVERGED.value)
         energy, r, v = _first_energy(lane), lane.r, lane.v
-        walls, remaining, hits = self.at_start(walls, lane.remaining), cut.h, 0.0
+        walls, remaining = self.at_start(walls, lane.remaining), cut.h
         for _i in range(_MOST_BOUNCES):
             hit = flights.first_hit(walls, None, r, v)
             t = min(hit.time, remaining)
             r, remaining = r + t * v, remaining - t
             if not hit.time < math.inf or remaining <= 0.0:
-                return _after(r, v, lane.remaining - cut.used, hits), Status.DONE.value
+                return _after(r, v, lane.remaining - cut.used, 0.0), Status.DONE.value
             if hit.wall < 0.0:
                 continue
             bounce = exact(NONE, walls, None, hit.wall, r, v, energy)
             v = bounce.v
             lanes.impulse[int(hit.wall), i] += bounce.impulse
-            hits += 1.0
-        return _after(r, v, lane.remaining, hits), Status.STALLED.value
+        return _after(r, v, lane.remaining, 0.0), Status.STALLED.value
 
 
 class CutSteps(StepNumbers):
@@ -248,10 +241,8 @@ class CutSteps(StepNumbers):
         part = self.dt / h
         return penalty.ContactStep(h, h, self.law.stiffened(part * part))
 
-    def is_new(self, walls, r):
-        return True
-
-    def lasts_outside(self, walls, wall, r):
+    def is_outside(self, walls, wall, r):
+        # A contact is one step.
         return False
 
     def held(self, walls, start, wall):

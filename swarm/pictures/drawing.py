@@ -16,8 +16,6 @@ from .speeds import are_alike
 from .style import MAP
 from .triad import INK
 
-LIGHT = INK
-
 
 def frame(
     axes: Any,

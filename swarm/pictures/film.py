@@ -28,6 +28,7 @@ from ..words.gone import gone_at, without
 from . import colours, drawing, flat, framed, style
 from .drawn import Drawn
 from .scenery import Scenery, red_green_blue
+from .triad import INK
 
 _SUFFIXES = (".mp4", ".gif")
 # Pixels of a side of the film.
@@ -154,16 +155,14 @@ class _Film:
         self._canvas: Any = FigureCanvasAgg(self.picture)
         self._across = across = self._scene.across()
         self._axes = self.picture.add_subplot()
-        self._title = self.picture.suptitle("t", fontsize=10, color=drawing.LIGHT)
+        self._title = self.picture.suptitle("t", fontsize=10, color=INK)
         found = self._found(numbers)
         self._scenery: Scenery | None = None
         self._walls: list[Any] = []
         self._dots: Any = None
         if across is not None:
             at = drawn.points(start.position).T
-            self._dots, self._walls = flat.flat(
-                self._axes, across, at, drawing.LIGHT, self._shapes, found, drawn.radius
-            )
+            self._dots, self._walls = flat.flat(self._axes, across, at, INK, self._shapes, found, drawn.radius)
             # Walls are before particles, and all that is still is drawn once, but for these.
             self._walls = [one for one in self._walls if self._changes or one.get_zorder() > self._dots.get_zorder()]
             changing = [*self._walls, self._dots]

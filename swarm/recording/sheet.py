@@ -11,6 +11,7 @@ from ..errors import RunError, SceneError
 from ..files import marks
 from ..files.replaced import named_when_whole
 from ..pictures import drawing, graphs, sentences, series, style
+from ..pictures.triad import INK
 from ..surfaces.plane import PLANES
 from ..words.amounts import many
 from . import viewer
@@ -97,7 +98,7 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
     top, middle, bottom = picture.subfigures(3, 1, height_ratios=heights, squeeze=False).ravel()
     _frames(top, playback, frames, found)
     picture.suptitle(title_of_sheet(playback), fontsize=12)
-    picture.text(0.995, 0.005, f"drawn by {by.split(',')[0]}", ha="right", va="bottom", fontsize=7, color=drawing.LIGHT)
+    picture.text(0.995, 0.005, f"drawn by {by.split(',')[0]}", ha="right", va="bottom", fontsize=7, color=INK)
     for axes, (group, curves) in zip(graphs.cells_of(middle, rows), plots.items(), strict=True):
         graphs.lines(axes, series.GRAPHS[group].across(plane), curves)
     sentences.write_below(bottom, sentence_lines, heights[-1])
@@ -111,9 +112,7 @@ def _frames(top: Any, playback: Playback, frames: list[int], found: list[Any] | 
     for place, k in enumerate(frames):
         at = -(-len(frames) // _COLUMNS), min(_COLUMNS, len(frames)), place + 1
         cells.append(top.add_subplot(*at))
-        cells[-1].set_title(
-            f"t = {playback.times[k]:.6g} s  (frame {playback.numbers[k]})", fontsize=10, color=drawing.LIGHT
-        )
+        cells[-1].set_title(f"t = {playback.times[k]:.6g} s  (frame {playback.numbers[k]})", fontsize=10, color=INK)
         if found:
             cells[-1].imshow(found[place])
             cells[-1].set_axis_off()

@@ -10,7 +10,6 @@ import tomli_w
 from numpy.typing import NDArray
 
 from ..common.status import Status
-from ..compiled_scene import CompiledScene
 from ..errors import RunError, SceneError
 from ..lanes.share import Share
 from ..lanes.table import LANES, STRIDE
@@ -32,15 +31,7 @@ Rows = dict[str, NDArray[Any]]
 class Impacts:
     """The logs that the threads of a run fill; a full log is written while they fill others.
 
-    Args:
-        compiled: the scene.
-        n: the number of particles.
-        particles: the particles with logged impacts: "all", k for every k-th one, or their numbers.
-        precision: the precision of positions, velocities and impulses; times are float64.
-        threads: the number of threads that fill logs.
-        counts: whether crossings of counters have rows too.
-        meet: whether particles meet one another.
-        lasts: whether contacts take time.
+    Positions, velocities and impulses have the precision of the run; times are float64.
 
     Attributes:
         kept: the particles and the precision, as TOML text.
@@ -52,25 +43,22 @@ class Impacts:
         queue: a function that lets the writer's thread call a function, in its turn among the frames.
     """
 
-    def __init__(
-        self, compiled: CompiledScene, n: int, particles: Any, precision: str, threads: int, counts: bool = False,
-        meet: bool = False, lasts: bool = False,
-    ) -> None:  # fmt: skip
-        laws, real = compiled.laws, np.dtype(precision)
-        self.kept = tomli_w.dumps({"particles": particles, "precision": precision})
-        self._chosen = chosen(particles, n)
+    def __init__(self, task: Task) -> None:
+        compiled, options, laws = task.compiled, task.options, task.compiled.laws
+        self.kept = tomli_w.dumps({"particles": options.impact_particles, "precision": options.precision})
+        self._chosen = chosen(options.impact_particles, task.count)
         self._slips, self._repeats = laws is not None and laws.friction is not None, compiled.scene.period is not None
-        self._real, self._meet = real, meet
-        # A flight may cross many counters.
-        in_order_of_time = meet or compiled.scene.reacts()
+        self._real, self._meet = np.dtype(options.precision), task.particles.radius is not None
+        takes_time = task.method.law() is not None
         # Contacts with several walls may end in one step.
-        most = min(LANES * len(compiled.numbering.surfaces_of_rows), _ROWS // 2) if lasts else LANES
-        self._lasts = meet and lasts
+        most = min(LANES * len(compiled.numbering.surfaces_of_rows), _ROWS // 2) if takes_time else LANES
+        self._lasts = self._meet and takes_time
         # Many contacts may end in a step of many grains.
-        rows = max(_ROWS, n) if self._lasts else _ROWS
-        self._room = rows // 2 if counts or self._lasts else 1 if in_order_of_time else most
+        rows = max(_ROWS, task.count) if self._lasts else _ROWS
+        # A flight may cross many counters; rows come one by one if particles depend on one another.
+        self._room = rows // 2 if options.counters or self._lasts else 1 if task.is_coupled else most
         self._spare: queue.SimpleQueue[Log] = queue.SimpleQueue()
-        for _ in range(2 * threads + _MORE):
+        for _ in range(2 * options.thread_count() + _MORE):
             self._spare.put(self._made(rows))
         # A log with the types that kernels take.
         self.example = self._made(0)
@@ -148,15 +136,7 @@ class Impacts:
 
 def log_of(task: Task) -> Impacts | None:
     """Return the log of impacts of a run, or None."""
-    options = task.options
-    if options.impacts is None:
-        return None
-    threads = options.thread_count()
-    return Impacts(
-        task.compiled, task.count, options.impact_particles, options.precision, threads,
-        bool(options.counters), task.particles.radius is not None,
-        task.method.law() is not None,
-    )  # fmt: skip
+    return None if task.options.impacts is None else Impacts(task)
 
 
 class ThreadLog:

@@ -167,10 +167,8 @@ class Session:
         """
         try:
             self._refuse(until)
-        except CompleteError:
-            raise
-        except SceneError:
-            if not overwrite:
+        except SceneError as error:
+            if not overwrite or isinstance(error, CompleteError):
                 raise
 
     def _refuse(self, until: float) -> None:

@@ -52,16 +52,11 @@ def quaternion(name: str, value: Any) -> Quaternion | None:
         half = 0.5 * angle
         turn = math.cos(half), *(math.sin(half) * part for part in axis)
     elif len(parts := parts_of(value) or ()) == 3 and all(parts_of(row) is not None for row in parts):
-        turn = _of_matrix(name, value)
+        given = np.array([vector(f"{name}[{i}]", row) for i, row in enumerate(value)])
+        turn = unit(name, _of_matrices(name, given)[0].tolist(), 4)
     else:
         turn = unit(name, value, 4)
     return turn if any(turn[1:]) else None  # type: ignore[return-value]
-
-
-def _of_matrix(name: str, value: Any) -> tuple[float, ...]:
-    """The unit quaternion of a rotation matrix."""
-    given = np.array([vector(f"{name}[{i}]", row) for i, row in enumerate(value)])
-    return unit(name, _of_matrices(name, given)[0].tolist(), 4)
 
 
 def quaternions(name: str, value: Any, count: int) -> NDArray[np.float64]:

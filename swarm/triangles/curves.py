@@ -99,8 +99,12 @@ def joined(points: Floats, pairs: Indices) -> list[Floats]:
 
 def runs(curve: Floats, kept: NDArray[np.bool_]) -> list[Floats]:
     """The parts of a curve with points that are kept, two points or more each."""
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
-    return [curve[a:b] for a, b in ends.reshape(-1, 2) if b - a > 1]
+    return [curve[a:b] for a, b in spans(kept) if b - a > 1]
+
+
+def spans(kept: NDArray[np.bool_]) -> Indices:
+    """The runs of points that are kept: of each its first point, and the first one after it (n, 2)."""
+    return np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8))).reshape(-1, 2)
 
 
 def finer(curve: Floats, step: float) -> Floats:

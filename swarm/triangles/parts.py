@@ -8,9 +8,9 @@ import numpy as np
 
 from ..scene import Scene
 from ..state import Floats
+from ..surfaces.fields.many import sign_of
 from ..surfaces.instant import box_of, distances, side_of
 from ..surfaces.part import handed_down
-from ..surfaces.presence.openings import sign_of
 from ..surfaces.surface import Surface
 from ..surfaces.union import Place
 

@@ -13,7 +13,7 @@ from ..surfaces.presence.openings import are_open
 from ..surfaces.room import polyhedron_bounds
 from ..surfaces.rotation import normalized
 from ..surfaces.surface import Surface
-from .curves import runs
+from .curves import runs, spans
 from .cut import Level, SmoothSurface
 from .gridded import Corners, around
 from .parts import Part
@@ -101,10 +101,7 @@ class PlaneWalls:
 
         found = []
         for curve in curves:
-            there = level(curve) <= 0.0
-            for a, b in np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8))).reshape(
-                -1, 2
-            ):
+            for a, b in spans(level(curve) <= 0.0):
                 first = [_end(level, curve[a], curve[a - 1])] if a else []
                 last = [_end(level, curve[b - 1], curve[b])] if b < len(curve) else []
                 if len(first) + len(last) + b - a > 1:

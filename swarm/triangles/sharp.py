@@ -70,13 +70,8 @@ def drawn(part: Part, box: Box, time: float) -> Walls:
     corners = frame.T @ at.given(np.array(list(itertools.product(*zip(*box, strict=True)))).T)
     low, high = np.maximum(low, corners.min(axis=1)), np.minimum(high, corners.max(axis=1))
     placed = _Placed(part, at, frame, low, high, float((box[1] - box[0]).max()))
-    points, triangles, normals, edges, first = (
-        [np.empty((0, 3))],
-        [np.empty((0, 3), np.int64)],
-        [np.empty((0, 3))],
-        [],
-        0,
-    )
+    points, normals, edges = [np.empty((0, 3))], [np.empty((0, 3))], list[Floats]()
+    triangles, first = [np.empty((0, 3), np.int64)], 0
     inwards = 1.0 if part.solid else -1.0
     for found, wall in _pieces(placed) if (low < high).all() else ():
         points.append(found.points)

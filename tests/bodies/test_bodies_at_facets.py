@@ -219,3 +219,19 @@ def test_each_part_has_its_own_restitution(kind):
         assert done.observables["impacts"][-1] == 1
         lost.append(done.observables["dissipated_energy"][-1])
     np.testing.assert_allclose(sorted(lost), [0.0, 0.75], atol=1e-12)
+
+
+@pytest.mark.slow
+def test_dice_come_to_rest_in_a_mesh():
+    # The forces of a short step were left out where a die fell through a facet: behind one its distance is negative.
+    die = swarm.rigid([(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)], density=1000.0)
+    random, places = np.random.default_rng(0), []
+    for _ in range(50):
+        turned = die.points @ np.linalg.qr(np.eye(3) + 0.05 * random.normal(size=(3, 3)))[0]
+        places.append((turned - (0.0, 0.0, 0.999 + (np.asarray(die.contacts) @ turned)[:, 2].min())).T)
+    dice = np.stack(places, axis=-1)
+    thrown = swarm.Bodies(die, dice, np.broadcast_to(np.array([0.3, 0.1, 0.0])[:, None, None], dice.shape))
+    vessel = swarm.Scene([box_of_triangles(restitution=0.7, friction=0.3)], gravity=(0.0, 0.0, -9.81))
+    done = swarm.simulate(vessel, thrown, swarm.Impact(dt=2e-3), until=1.0)
+    assert done.observables["energy_error"].max() < 1e-12
+    np.testing.assert_allclose(done.observables["total_energy"][-1], -50 * 8.0 * 9.81 * 0.9, rtol=1e-9)

@@ -9,7 +9,7 @@ from grains_runs import ran
 
 import swarm
 from swarm import RunError, SceneError
-from swarm.commands.summary import numbers, of_trajectory
+from swarm.commands.summary import numbers, of_file
 from swarm.grains import contacts, step
 from swarm.grains.grains_run import GrainsRun
 from swarm.pictures.series import lines_of
@@ -335,9 +335,7 @@ def test_an_overlap_is_in_files_and_in_verdicts(tmp_path):
     drawn = {line.path: line.observable for line in lines_of(scene, SOFT, [], None, result.observables)}
     assert drawn["/overlap"] == "largest_overlap"
     percent = f"{100.0 * deepest / RADIUS:.2g} %"
-    assert of_trajectory(path)["contacts"].startswith(
-        f"✗ balls overlapped by at most {1e3 * deepest:.2g} mm, {percent}"
-    )
+    assert of_file(path)["contacts"].startswith(f"✗ balls overlapped by at most {1e3 * deepest:.2g} mm, {percent}")
     content = Content("", scene, SOFT, None, 2, dict(result.observables), {"end": result.particles})
     (statement,) = [one for one in judged(content) if one.label == "contacts"]
     assert statement.verdict is False

@@ -170,7 +170,7 @@ def test_particles_are_no_bodies(tmp_path):
         assert (trajectory.body, trajectory.copies) == (None, 0)
         with pytest.raises(swarm.SceneError, match=r"run\.h5 holds particles, not bodies; use frame\(0\)"):
             trajectory.bodies(0)
-    assert summary.of_trajectory(tmp_path / "run.h5")["what runs"].startswith("1 particle of ")
+    assert summary.of_file(tmp_path / "run.h5")["what runs"].startswith("1 particle of ")
 
 
 @pytest.mark.parametrize(
@@ -364,7 +364,7 @@ def test_pictures_show_bodies_and_the_error_of_links(run, tmp_path, monkeypatch)
 
 def test_the_summary_says_what_they_are(run, tmp_path):
     path, frames = run
-    rows, summed = summary.of_trajectory(path), summary.numbers(path)
+    rows, summed = summary.of_file(path), summary.numbers(path)
     assert rows["body"] == ("4 points, 6 links" if frames[0].body is CUBE else "3 points, 2 links")
     assert rows["what runs"].startswith(f"{COPIES} ")
     assert rows["links"] == "✓ they keep their lengths: the worst is off by 9·10⁻¹⁶ of it"
@@ -384,7 +384,7 @@ def test_work_of_anchors_is_no_drift(tmp_path):
     with edited(tmp_path / "run.h5") as file:
         file["observables/work/value"][:] = [0.0, 0.25]
         file["observables/total_energy/value"][:] = [1.0, 1.25]
-    rows = summary.of_trajectory(tmp_path / "run.h5")
+    rows = summary.of_file(tmp_path / "run.h5")
     assert rows["body"] == "2 points, 1 spring, 1 anchor"
     assert "work of anchors 0.25 J" in rows["balance of energy"]
     with swarm.load(tmp_path / "run.h5") as trajectory:
@@ -400,5 +400,5 @@ def test_the_words_have_the_mass_of_a_body_and_the_speed_of_its_centre(tmp_path)
     start = swarm.Bodies(body, np.array(body.points).T[:, :, None], spins)
     scene = swarm.Scene([swarm.Sphere(2.0)])
     swarm.simulate(scene, start, swarm.Impact(dt=1e-3), until=2e-3, trajectory=tmp_path / "run.h5", compile="never")
-    stated = summary.of_trajectory(tmp_path / "run.h5")["what runs"]
+    stated = summary.of_file(tmp_path / "run.h5")["what runs"]
     assert stated.endswith("of 4 kg, at the start with 1 m/s")

@@ -49,7 +49,7 @@ def whole(files, tmp_path):
 
 def everything(path):
     """All that is read of a trajectory, as shapes; every number is finite."""
-    summary.of_trajectory(path)
+    summary.of_file(path)
     with swarm.load(path) as trajectory:
         seen = trajectory.observables
         parts = [trajectory.times, trajectory.wall_times, *seen.values()]
@@ -246,7 +246,7 @@ def test_a_foreign_file_is_no_trajectory_of_swarm(tmp_path, names):
         for name in names:
             file[name] = [1.0]
     with pytest.raises(swarm.SceneError, match=r"other\.h5 is an HDF5 file, but not a trajectory of swarm"):
-        summary.of_trajectory(tmp_path / "other.h5")
+        summary.of_file(tmp_path / "other.h5")
 
 
 def test_a_path_without_a_file_is_one_sentence(tmp_path):
@@ -260,7 +260,7 @@ def test_a_path_without_a_file_is_one_sentence(tmp_path):
         scene_file.read(tmp_path / "scene.toml").start()
 
     (tmp_path / "folder").mkdir()
-    readers = [swarm.load, summary.of_trajectory, started, playback.Playback, playback.described, playback.repair]
+    readers = [swarm.load, summary.of_file, started, playback.Playback, playback.described, playback.repair]
     for read in readers:
         for name, message in (
             ("absent", r"there is no file .*absent"),
@@ -309,7 +309,7 @@ def cut_to(path, frames):
 @pytest.mark.physics
 def test_one_frame_is_drawn_recorded_and_reported(whole):
     cut_to(whole, 1)
-    assert summary.of_trajectory(whole)["frames"] == "1, 0 s to 0 s"
+    assert summary.of_file(whole)["frames"] == "1, 0 s to 0 s"
     with swarm.load(whole) as trajectory:
         plots.draw_plot(trajectory, whole.with_suffix(".png"))
         recorded.record(trajectory, whole.with_suffix(".rrd"), recording.Settings())
@@ -319,7 +319,7 @@ def test_one_frame_is_drawn_recorded_and_reported(whole):
 
 def test_no_frame_is_a_sentence(whole):
     cut_to(whole, 0)
-    assert summary.of_trajectory(whole)["frames"] == "0: the run ended before the first was written"
+    assert summary.of_file(whole)["frames"] == "0: the run ended before the first was written"
     with swarm.load(whole) as trajectory:
         assert trajectory.times.tolist() == []
         for read in (

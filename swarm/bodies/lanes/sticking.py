@@ -41,7 +41,10 @@ def leave_out(bodies, i):
     for a in range(pace.active[i]):
         k, wall = active.name[i, a, 0], float(active.name[i, a, 1])
         before = bodies.walls_between(i).distance(wall, bodies.spot(lanes.ra, k, i))
-        if not bodies.walls_after(i).distance(wall, bodies.spot(lanes.p, k, i)) - before <= rule.room:
+        gap = bodies.walls_after(i).distance(wall, bodies.spot(lanes.p, k, i))
+        # The distance is negative behind a wall that ends, as the way there goes through the wall.
+        behind = bodies.passed(k, bodies.touching.place(lanes.p, k, i), rule.room + max(before, 0.0), i).gap
+        if not max(gap, behind) - before <= rule.room:
             return False
     for a in range(ties.links):
         lanes.multiplier[a, i] = 0.0

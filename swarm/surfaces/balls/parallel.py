@@ -9,6 +9,7 @@ from ...common.checks import Vector
 from ...kernel.jit import kernel
 from ...kernel.vector import Vec, column
 from ...state import Floats
+from .. import rotation as rotations
 from ..surface import UNBOUNDED, Box, Surface, shown
 from .by_foot import ByFoot
 
@@ -23,7 +24,20 @@ class Parallel(Surface):
 
     def tightest(self) -> tuple[float, Vector | None]:
         """The smallest radius of curvature that is certain [m], and where on the surface, None where it is infinite."""
+        radius, where = self.own_tightest()
+        if where is None:
+            return radius, None
+        turned = rotations.turned(self.rotation, where)
+        x, y, z = (float(a + b) for a, b in zip(self.middle(), turned, strict=True))
+        return radius, (x, y, z)
+
+    def own_tightest(self) -> tuple[float, Any]:
+        """The same, with the place from the middle on, before the surface is rotated about that."""
         raise NotImplementedError
+
+    def middle(self) -> Vector:
+        """The place about which the surface is rotated."""
+        return self.center  # type: ignore[attr-defined, no-any-return]
 
     def by_foot(self, largest: float) -> ByFoot:
         """What balls up to a radius meet, in the frame of `numbers`."""
@@ -32,7 +46,7 @@ class Parallel(Surface):
 
     def framed_alike(self, wall: Any) -> Any:
         """A wall in the frame of `numbers` as the scene has it."""
-        raise NotImplementedError
+        return rotations.rotated(self.rotation, wall)
 
     def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
         return (self.framed_alike(self.by_foot(largest)),)

@@ -109,15 +109,11 @@ class Sampled(Parallel):
 
     def _spline(self) -> Spline:
         made: Samples = self._made
-        return made.spline(np.array(rotations.turned_back(self.rotation, self._middle())) - 0.5 * made.widths)
+        return made.spline(np.array(rotations.turned_back(self.rotation, self.middle())) - 0.5 * made.widths)
 
-    def tightest(self) -> tuple[float, Vector | None]:
-        (_most, _known, radius), where = self._made.roundness[self.side == "outside"], self._made.least_steep[1]
-        if math.isinf(radius):
-            return radius, None
-        x, y, z = rotations.turned(self.rotation, (where - 0.5 * self._made.widths).tolist())
-        a, b, c = self._middle()
-        return radius, (a + x, b + y, c + z)
+    def own_tightest(self) -> tuple[float, Floats | None]:
+        _most, _known, radius = self._made.roundness[self.side == "outside"]
+        return radius, None if math.isinf(radius) else self._made.least_steep[1] - 0.5 * self._made.widths
 
     def by_foot(self, largest: float) -> ByFoot:
         made, numbers = self._made, self.numbers()
@@ -126,10 +122,7 @@ class Sampled(Parallel):
         low, high = np.where(made.endless, [[-math.inf], [math.inf]], [first, first + made.widths]).tolist()
         return foot_of(numbers, most, radius, (tuple(low), tuple(high)), known)
 
-    def framed_alike(self, wall: Any) -> Any:
-        return rotations.rotated(self.rotation, wall)
-
-    def _middle(self) -> Vector:
+    def middle(self) -> Vector:
         x, y, z = (np.array(self.origin) + 0.5 * self._made.widths).tolist()
         return x, y, z
 
@@ -153,7 +146,7 @@ class Sampled(Parallel):
 
     def _placed(self, low: Floats, high: Floats) -> Box:
         box = tuple(tuple((np.array(self.origin) + corner).tolist()) for corner in (low, high))
-        return rotated_box(self.rotation, box, self._middle())  # type: ignore[arg-type]
+        return rotated_box(self.rotation, box, self.middle())  # type: ignore[arg-type]
 
     def extent(self) -> float:
         low, high = self._placed(np.zeros(3), self._made.widths)
@@ -164,7 +157,7 @@ class Sampled(Parallel):
         return replace(self, origin=(x, y, z))
 
     def turned(self, turn: rotations.Quaternion) -> Surface:
-        middle = self._middle()
+        middle = self.middle()
         shift = np.array(rotations.turned(turn, middle)) - middle
         return Surface.turned(self.shifted(shift.tolist()), turn)
 

@@ -16,6 +16,7 @@ from ...motion.wall import product
 from ...state import Floats
 from .. import rotation as rotations
 from ..area_samples import AreaSample, Region
+from ..instant import side_of
 from ..presence.patched import Patched
 from ..shapes.sphere import Sphere, SphereNumbers
 from ..surface import UNBOUNDED, Box, Surface
@@ -269,6 +270,11 @@ class ManyBodies(Many):
         with np.errstate(all="ignore"):
             nearest(self.members, flat, found)
         return found.reshape(4, *np.shape(rows.x))
+
+
+def sign_of(volume: Surface) -> float:
+    """The sign of phi out of a volume, which of many bodies is the inside of each."""
+    return 1.0 if isinstance(volume, Many) else side_of(volume)
 
 
 def members_of(

@@ -15,7 +15,6 @@ from ...errors import SceneError
 from ...kernel.limits import EPSILON
 from ...kernel.vector import Vec, vec
 from ...state import Floats
-from .. import rotation as rotations
 from ..balls.by_foot import ByFoot
 from ..balls.parallel import Parallel, foot_of, nearer, tightest_of
 from ..curvature import matrices_of
@@ -91,21 +90,14 @@ class FormSurface(Parallel):
     def numbers(self) -> Any:
         return self._form.numbers(self.own_center())
 
-    def tightest(self) -> tuple[float, Vector | None]:
-        radius, where = self._form.tightest
-        if where is None:
-            return radius, None
-        x, y, z = (a + b for a, b in zip(self.center, rotations.turned(self.rotation, where), strict=True))
-        return radius, (x, y, z)
+    def own_tightest(self) -> tuple[float, Vector | None]:
+        return self._form.tightest
 
     def by_foot(self, largest: float) -> ByFoot:
         form, center = self._form, np.array(self.own_center())
         low, high = (center + corner for corner in np.array(form.wall_box(largest)))
         box = tuple(low.tolist()), tuple(high.tolist())
         return foot_of(self.numbers(), form.bend.most, form.tightest[0], box)  # type: ignore[arg-type]
-
-    def framed_alike(self, wall: Any) -> Any:
-        return rotations.rotated(self.rotation, wall)
 
     def size(self) -> float:
         return self._form.size

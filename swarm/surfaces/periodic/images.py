@@ -42,7 +42,7 @@ def images_of(surface: Surface, period: Lengths, name: str, largest: float = 0.0
 
     Raises:
         SceneError: the surface is neither bounded along the period nor the same all along it, it is longer than the
-            period, a cavity that is not within the cell, or it moves along the period.
+            period, a cavity that is not within the cell, or it moves along the period or turns over a face.
     """
     _require_place(surface, period, name)
     if isinstance(surface, Outlined):
@@ -52,13 +52,21 @@ def images_of(surface: Surface, period: Lengths, name: str, largest: float = 0.0
         return [_many_images(surface, period, name, largest)]
     low, high = extent_of(surface)
     shifts: list[list[float]] = [[0.0], [0.0], [0.0]]
+    turns = [one for one in parts_of(surface.motion) if isinstance(one, Rotation)]
     for k, length in enumerate(period):
-        if length is not None and not is_same_along(surface, k, period):
+        if length is None:
+            continue
+        if not is_same_along(surface, k, period):
             title = f"{name} ({type(surface).__name__})"
             shifts[k] = _shifts(surface, (low[k], high[k]), length, title, k, largest)
+        elif any(abs(unit_axis(one)[k]) < 1.0 for one in turns):
+            raise SceneError(
+                f"{name}.motion must not turn a surface that goes on over the faces of the cell along {'xyz'[k]}, got "
+                f"{surface.motion}; its velocity does not repeat: leave period[{k}] out"
+            )
     every = itertools.product(*shifts)
     found = [surface.shifted(shift) if any(shift) else surface for shift in every]  # type: ignore[arg-type]
-    if len(found) > 1 and any(isinstance(one, Rotation) for one in parts_of(surface.motion)):
+    if turns and len(found) > 1:
         raise SceneError(
             f"{name}.motion must not turn a surface that reaches over a face of the cell, got {surface.motion}; move "
             "the surface to where it is within the cell"

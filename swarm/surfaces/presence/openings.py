@@ -19,7 +19,7 @@ from ...kernel.jit import select
 from ...kernel.limits import TINY
 from .. import required
 from ..fields.grouped import by_kind
-from ..fields.many import Many, members_of
+from ..fields.many import Many, members_of, sign_of
 from ..fields.members import Members, can_be_member, kind_of
 from ..instant import distances_of, has_room, side_of
 from ..outlines.outlined import Outlined
@@ -241,11 +241,6 @@ def _box_around(surface: Surface, opening: Surface) -> Any:
     # Also where the box of a flat volume has no width
     room = 1e-9 * reach
     return np.maximum(low - room, -reach), np.minimum(high + room, reach)
-
-
-def sign_of(opening: Surface) -> float:
-    """The distance that phi gives where the volume is not."""
-    return 1.0 if isinstance(opening, Many) else side_of(opening)
 
 
 def _box_of(opening: Surface) -> Any:

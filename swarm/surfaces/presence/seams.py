@@ -15,7 +15,7 @@ import numpy as np
 from ...errors import SceneError
 from ...kernel.limits import TINY
 from ...state import Floats
-from ..fields.many import Many
+from ..fields.many import Many, sign_of
 from ..instant import distances, side_of
 from ..room import Room, room_bounds
 from ..rotation import matrix, normalized
@@ -276,7 +276,7 @@ class _Rooms(NamedTuple):
                 some = (worst == k) & (out > 0.0)
                 one, sign, _more = asked[k]
                 at = points[:, some] + sign * shift * normals[:, some]
-                way = _sign_of(one) * one.gradient(at)
+                way = sign_of(one) * one.gradient(at)
                 # Along the face
                 way = way - (way * normals[:, some]).sum(axis=0) * normals[:, some]
                 length = np.maximum(np.sqrt((way**2).sum(axis=0)), TINY)
@@ -296,10 +296,6 @@ class _Rooms(NamedTuple):
         return points.shape[1] >= ENOUGH and bool((_gaps(other, points) <= OUTSIDE * self.size).all())
 
 
-def _sign_of(surface: Surface) -> float:
-    return 1.0 if isinstance(surface, Many) else side_of(surface)
-
-
 def _gaps(room: Room, points: Floats) -> Floats:
     """The largest `_gap` of a room."""
     return np.asarray(np.max([_gap(one, points) for one in room], axis=0))
@@ -313,7 +309,7 @@ def _gap(surface: Surface, points: Floats) -> Floats:
 
 def _distance(surface: Surface, points: Floats) -> Floats:
     """How far points (3, N) are out of the admissible side of a surface, or out of a volume [m], to first order."""
-    return _sign_of(surface) * distances(surface, points)
+    return sign_of(surface) * distances(surface, points)
 
 
 # --- Rooms that are joined -------------------------------------------------------------------------------

@@ -46,8 +46,8 @@ class Paraboloid(Revolved, Parallel):
         a = 0.25 / self.focal_length
         return quadric_numbers(self.own_center(), (a, a, 0.0), (0.0, 0.0, -1.0), 0.0, self.side)
 
-    def tightest(self) -> tuple[float, Vector | None]:
-        return (math.inf, None) if self.is_solid() else (2.0 * self.focal_length, self.center)
+    def own_tightest(self) -> tuple[float, Vector | None]:
+        return (math.inf, None) if self.is_solid() else (2.0 * self.focal_length, (0.0, 0.0, 0.0))
 
     def framed_alike(self, wall: Any) -> Any:
         return rotated(self.turn(), wall)

@@ -178,12 +178,8 @@ class Quadric(Parallel):
         frame = self._frame
         return quadric_numbers(self.own_center(), frame.curvatures, frame.linear, frame.level, self.side)
 
-    def tightest(self) -> tuple[float, Vector | None]:
-        radius, where = self._frame.tightest(side_sign(self.side))
-        if where is None:
-            return radius, None
-        x, y, z = (np.array(self.center) + rotations.product(rotations.matrix(self.rotation), where)).tolist()
-        return radius, (x, y, z)
+    def own_tightest(self) -> tuple[float, NDArray[np.float64] | None]:
+        return self._frame.tightest(side_sign(self.side))
 
     def framed_alike(self, wall: Any) -> Any:
         return rotations.framed(self._axes(), wall)

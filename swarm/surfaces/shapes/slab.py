@@ -81,9 +81,9 @@ class Slab(Surface):
 
 
 class Along(Record):
-    """An axis of the scene as a unit vector, of which a kind says which axis."""
+    """An axis of the scene as a unit vector; its class says which axis."""
 
-    length: float  # 1: a record has a field
+    length: float  # 1
 
     axis = 0
 
