@@ -210,10 +210,10 @@ class Scene:
         if radius is not None:
             return np.asarray((self.distances_outside(points, 0.0, radius) <= 0.0).all(axis=0))
         rows = points if self.period is None else into_cell(self.period, points)[0]
-        admitted = np.zeros(rows.shape[1]) == 0.0
+        refused = np.zeros(rows.shape[1], dtype=bool)
         for image in (image for images in self.pieces.images for image in images if image.is_there(0.0)):
-            admitted[admitted] = image.admits(rows[:, admitted])
-        return admitted
+            refused[~refused] = ~image.admits(rows[:, ~refused])
+        return ~refused
 
     def distances_outside(
         self, points: ArrayLike, time: float = 0.0, radius: NDArray[np.float64] | None = None
