@@ -34,7 +34,7 @@ def balls_volume(scene: Scene, radius: Floats) -> float:
 
 
 def volume_of(scene: Scene, particles: Particles) -> float:
-    """The volume of particles [m^3], in a plane the area [m^2]: the one they were filled into, else that of the cell.
+    """The volume of particles [m^3], in a plane the area [m^2]: what `fill` filled with them, else the cell.
 
     It is NaN if neither is known.
     """

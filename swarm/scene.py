@@ -454,7 +454,7 @@ class Scene:
     def compiled(self, largest: float | None = None, apart: str | None = None) -> CompiledScene:
         """Return the scene as kernels take it, for points, or for balls with radii up to `largest` [m].
 
-        `apart` names the method that does not take listed solids of one kind as a field: then each solid is a wall. In
+        With `apart`, the name of a method, each listed solid is a wall; without it, solids of one kind are a field. In
         fixed steps of points each field, and each union of several rooms, is one wall too.
 
         Raises:

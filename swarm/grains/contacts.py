@@ -103,7 +103,7 @@ def weight_of(law):
 
 
 def lasting(gap):
-    """1 if a contact with this gap was one in the step before, else 0: then the impulses kept of it are out of date."""
+    """Return 1 if a contact with this gap was one in the step before, else 0, as its kept impulses are out of date."""
     return select(gap > 0.0, 1.0, 0.0)
 
 
@@ -156,7 +156,7 @@ def size_of(a):
     return total(absolute(a))
 
 
-# --- Of sweeps for friction ------------------------------------------------------------------------------
+# --- Sweeps for friction ---------------------------------------------------------------------------------
 
 
 class ContactSweep(Record):
@@ -172,7 +172,7 @@ class ContactSweep(Record):
 
 
 def is_due(sweep, stirred, i):
-    """Whether a contact of a ball was not solved in the sweep before or in this one; else none of them changes."""
+    """Whether a contact of a ball was unsolved in this sweep or the one before; else none of its contacts changes."""
     return stirred[i] >= sweep.number - 1
 
 
@@ -181,7 +181,7 @@ def stir(sweep, stirred, i, off):
     stirred[i] = select(off <= sweep.solved, stirred[i], sweep.number)
 
 
-# --- Of pairs --------------------------------------------------------------------------------------------
+# --- Pairs -----------------------------------------------------------------------------------------------
 
 
 class Closing(Record):

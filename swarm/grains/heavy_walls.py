@@ -129,7 +129,7 @@ def is_heavy(wall):
     return isinstance(_own(wall), HeavyWall)
 
 
-# --- Of one contact; `own` is the surface that the ball meets --------------------------------------------
+# --- One contact; `own` is the surface that the ball meets -----------------------------------------------
 
 
 def now(own):
@@ -170,7 +170,7 @@ def react(own, impulse):
         own.drive.push(-1.0 * impulse)
 
 
-# --- Of a step -------------------------------------------------------------------------------------------
+# --- A step ----------------------------------------------------------------------------------------------
 
 
 @outlined

@@ -231,7 +231,7 @@ def group_pairs(matter, grains, near, touches, known):
             _begin_group(matter, grains, near, touches, (last, lane, lane + 1, False))
 
 
-# --- At its end ------------------------------------------------------------------------------------------
+# --- At the end of a step --------------------------------------------------------------------------------
 
 
 def lanes_between(begin, end):

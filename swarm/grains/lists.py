@@ -132,7 +132,7 @@ def _list_cells(period, grains, near, given, some, way, found):
 
 
 def _depth(wall, r):
-    """The depth of a ball in a wall to first order, which may be off by half; of faces that end, an upper bound."""
+    """The depth of a ball in a wall to first order, which may be off by half; for faces that end, an upper bound."""
     return -wall.clearance(r) if isinstance(wall, JoinedFaces) else wall.distance(r)
 
 

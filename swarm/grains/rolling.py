@@ -40,7 +40,7 @@ def _resist(contact, rolling, sizes, sweep):
     return part, size_of(more * (1.0 / radius)) * contact.number(col.SCALE)
 
 
-# --- Of pairs --------------------------------------------------------------------------------------------
+# --- Pairs -----------------------------------------------------------------------------------------------
 
 
 @outlined
@@ -92,7 +92,7 @@ def book_rolling_pairs(grains, near, touches, books):
             books.dissipated[index(grains.number[j])] += lost
 
 
-# --- Of walls --------------------------------------------------------------------------------------------
+# --- Walls -----------------------------------------------------------------------------------------------
 
 
 def _spin_of(wall, grains, touches, c, i):

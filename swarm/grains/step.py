@@ -97,7 +97,7 @@ class World(NamedTuple):
     places: Any = None  # for each wall an array (members,) int64: the number of each member in the scene; or None
 
 
-# --- Of one step -----------------------------------------------------------------------------------------
+# --- One step --------------------------------------------------------------------------------------------
 
 
 @outlined
@@ -499,7 +499,7 @@ def _step(matter, walls, listed, world, skin):
     return Status.DONE.value
 
 
-# --- Of a frame ------------------------------------------------------------------------------------------
+# --- A frame ---------------------------------------------------------------------------------------------
 
 
 @wide_long_kernel
@@ -507,8 +507,8 @@ def march(matter, walls, world, clock, rule):
     """Take step after step until the end of the frame, or the stop before it; return the `Status`.
 
     It is LEASE_ENDED where lists are to be made anew, as also after an escape, and LOG_FULL where the log of contacts
-    needs an empty part: then call this again. It is INTERRUPTED after `rule.halt` steps; a later call goes on with
-    the same bits.
+    needs an empty part; the caller calls this again after both. It is INTERRUPTED after `rule.halt` steps; a later
+    call goes on with the same bits.
     """
     while clock[col.DONE] < rule.stop:
         if clock[col.TAKEN] >= rule.halt[0]:

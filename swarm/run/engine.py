@@ -51,8 +51,8 @@ _DONE: End = (int(Status.DONE), 0, None)
 class Run(BaseRun):
     """The run of points; the state holds the arrays of the particles, not copies."""
 
-    # The work in the last frame per unit of its span [s]. Infinite if unknown: then another thread than the caller's
-    # compiles missing kernels.
+    # The work in the last frame per unit of its span [s]. It is infinite if unknown, so that another thread than the
+    # caller's compiles missing kernels.
     _pace = math.inf
 
     def __init__(

@@ -23,9 +23,9 @@ class Watch:
     """The halt of the kernels of a frame.
 
     Python handles a signal only in the main thread, between two of its instructions. So the caller's thread, which may
-    be the main thread, computes only a few passes; then it leaves the frame to others and waits for them. If these
+    be the main thread, computes only a few passes, leaves the frame to other threads, and waits for them. If these
     passes take longer than in the frames before, for instance where particles come to rest on moving walls, a guard
-    frees it: a thread that looks at the clock.
+    frees the caller's thread: the guard is a thread that looks at the clock.
     (Rejected: a thread that receives signals. It needs the wakeup descriptor, which asyncio uses.)
 
     Attributes:

@@ -131,7 +131,7 @@ class SoftContacts(BodyContacts):
             g0 = self._start(wall, touching.place(lanes.ra, k, i))
             g1 = _gap(self.walls, wall, touching.place(lanes.r1, k, i))
             # In State I the force jumps at g1 = 0 from 0 to lambda, which may be more than a step needs while links are
-            # not met: then the force is the one that gives g1 = 0, as at a rigid wall.
+            # not met. The force is then the one that gives g1 = 0, as at a rigid wall.
             force = active.press[i, 3 * a] + g1 / system[a, a]
             if g0 == 0.0 and 0.0 <= force <= multiplier:
                 error = max(error, abs(g1) / rule.room)

@@ -201,7 +201,7 @@ def alone(wall):
     return Walls((Field(wall) if isinstance(wall.body, Members) else wall,))
 
 
-# --- Without turning -------------------------------------------------------------------------------------
+# --- Walls that do not turn ------------------------------------------------------------------------------
 
 
 class Shifted(Freedom):

@@ -99,7 +99,7 @@ class ReactionRule(NamedTuple):
     moment: float  # the end of the frame since the start of the run [s]
 
 
-# --- Of one particle -------------------------------------------------------------------------------------
+# --- Events of one particle ------------------------------------------------------------------------------
 
 
 def _aim(scenery, queue, i, end):
@@ -254,7 +254,7 @@ def _strike(scenery, walls, queue, i, rule, now):
     queue.watchers.hit(None, Struck(i, float(blow.owner), time, blow.r, v, v1, blow.impulse, blow.slip))
 
 
-# --- Of all ----------------------------------------------------------------------------------------------
+# --- Events of all particles -----------------------------------------------------------------------------
 
 
 def _soon(clock):

@@ -55,7 +55,7 @@ def require_few_impacts(
         found = _of_particles(compiled, particles, impact)
         if found.between >= enough:
             return
-        # Particles may start in a narrow corner and leave it: then the volume around it decides.
+        # Particles may start in a narrow corner and leave it. The volume around it then decides.
         found = max(found, _of_volume(compiled, particles, impact))
     if every > _MOST_A_FRAME * found.between:
         i, fastest = int(compiled.numbering.members[0, found.wall]), particles.fastest()
