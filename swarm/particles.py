@@ -227,7 +227,7 @@ def _images(value: ArrayLike, n: int) -> NDArray[np.int64]:
     """Return the argument `image`, checked."""
     given = checks.array("image", value)
     given = given.reshape(3, 1) if given.ndim == 1 and given.size == 3 else given
-    # Not all whole numbers beyond this are floats.
+    # Some whole numbers beyond this are not floats.
     if given.shape != (3, n) or not (np.abs(given) <= 2.0**53).all() or (given != np.floor(given)).any():
         raise SceneError(f"image must be whole numbers of shape (3, {n}), at most 2**53, got {checks.shown(value)}")
     return given.astype(np.int64, order="C")

@@ -91,7 +91,7 @@ def _turn(seed: int, k: int, number: int, across: int | None) -> Floats:
     q = stream(seed, k, _TURNS, number).standard_normal(4)
     if across is not None:
         q[[1 + axis for axis in along(across)]] = 0.0
-    # Not by BLAS, as the last bit would depend on the processor.
+    # BLAS is not used, as its last bit depends on the processor.
     return np.asarray(q / np.sqrt((q**2).sum()))
 
 

@@ -172,7 +172,7 @@ class Body:
     def center_of(self, position: Floats) -> Floats:
         """The centres of mass (3, n) of copies (3, P, n), or their velocities from velocities (3, P, n)."""
         weight = self.mass_matrix.sum(axis=0)
-        # Not by BLAS, as the last bit would depend on the processor, and on the number of copies.
+        # BLAS is not used, as its last bit depends on the processor and on the number of copies.
         return np.asarray(sum(part * position[:, point] for point, part in enumerate(weight / weight.sum())))
 
     def inverse_mass(self) -> Floats:

@@ -51,11 +51,11 @@ def distance(body: Body) -> float:
     corners = touching[body.faces]
     longest, bounds = _sides(corners).max(axis=1, initial=0.0), _from_corners(corners)
     farthest = 0.0
-    # In the order of falling bounds, until a bound is below the distance found.
+    # The order is that of falling bounds, until a bound is below the distance found.
     for k in np.argsort(-bounds):
         if bounds[k] <= farthest:
             break
-        # Relative to the middle of the triangle, where differences of squares keep enough digits.
+        # Places are relative to the middle of the triangle, so that differences of squares keep enough digits.
         arms, sides = touching - corners[k].mean(axis=0), corners[k] - corners[k].mean(axis=0)
         near = arms[(arms**2).sum(axis=1) <= (longest[k] + bounds[k]) ** 2]
         parts, nearest, between = _FIRST // 2, 0.0, math.inf

@@ -67,7 +67,7 @@ def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float =
 
 def _probes(scene: Scene, body: Body) -> Floats:
     """The points (Q, 3) of the body that must be within the walls."""
-    # Not by BLAS, as the last bit would depend on the processor.
+    # BLAS is not used, as its last bit depends on the processor.
     corners = np.einsum("kp,px->kx", body.contacts, body.points) if len(body.contacts) else body.points
     if not any(surface.is_solid() for surface in scene.surfaces):
         return corners
@@ -117,5 +117,5 @@ def _rotations(random: np.random.Generator, n: int) -> Floats:
 def _turned(turns: Floats, arms: Floats) -> Floats:
     """Return the points (P, 3) in n orientations, (3, P, n)."""
     x, y, z = arms.T[:, :, None]
-    # Not by BLAS, as the last bit would depend on the processor.
+    # BLAS is not used, as its last bit depends on the processor.
     return np.asarray(turns[:, 0, None] * x + turns[:, 1, None] * y + turns[:, 2, None] * z)

@@ -159,7 +159,7 @@ def _hull(corners: Floats) -> Pairs:
         from scipy.spatial import ConvexHull, QhullError
     size = np.ptp(corners, axis=0).max()
     try:
-        # Relative to the middle and the extent of the corners, as the tolerances of Qhull are absolute.
+        # Corners are relative to their middle and their extent, as the tolerances of Qhull are absolute.
         hull = ConvexHull((corners - corners.mean(axis=0)) / (size or 1.0))
     except (QhullError, ValueError):
         raise _flat(corners) from None

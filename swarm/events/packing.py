@@ -119,7 +119,7 @@ def _radii(scene: Scene, n: int | None, radius: ArrayLike | None, fraction: floa
     assert sizes is not None
     if fraction is None:
         return sizes
-    # Relative to the first radius, so that sums of cubes neither overflow nor vanish.
+    # Radii are relative to the first one, so that sums of cubes neither overflow nor vanish.
     sizes = sizes / sizes[0]
     part = balls_volume(scene, sizes) / (fraction * room.volume)
     return np.asarray(sizes * part ** (-1.0 / len(scene.axes())))

@@ -51,7 +51,7 @@ class ContactTotals(NamedTuple):
 
 def _lost(matter, work, gap, change):
     """The energy that the damper of a contact takes [J]; `work` is the work of its impulse times the step."""
-    # From the impulse as it is, not from the law of the damper: no energy is missing, however well the step is solved.
+    # The impulse counts as it is, not the law of the damper, so that no energy is missing if the step is solved badly.
     force, _slope = matter.law.energy_slope(gap, gap + change)
     return -work / matter.h - force * change
 

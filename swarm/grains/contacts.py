@@ -265,7 +265,7 @@ def find_pairs(matter, near, touches):
         for k in range(near.first[i], near.first[i + 1]):
             b, was_on = near.mate[index(k)], near.is_on[index(k)]
             q, reach = _approach(matter, course, ball, index(b))
-            # Without a branch, which no processor could predict: a row that does not count is written over.
+            # There is no branch, which no processor could predict; a row that does not count is written over.
             is_on = was_on | (q < reach * reach)
             near.is_on[index(k)] = is_on
             _note(found, index(count), a, b, k)

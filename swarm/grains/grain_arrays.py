@@ -32,8 +32,8 @@ START, SIZE, GAP, PUSH, IMPULSE, COAST, DAMPING, GAIN, SCALE, EASES = 0, 3, 4, 5
 COLUMNS_SWEPT = 17
 # The inverse of the mass that moves, the impulse of friction, and for a pair 1/(R_i + R_j) and the levers of both.
 EASE, DRAG, NEARNESS, LEVERS, COLUMNS_RUBBED = 17, 18, 21, 22, 24
-# At a wall the place in the lists; the angular impulse of the resistance to rolling; the energy that friction and this
-# resistance take.
+# The place in the lists, for a wall; the angular impulse of the resistance to rolling; the energy that friction and
+# this resistance take.
 LISTED, ROLL, RUBBED, COLUMNS = 24, 25, 28, 29
 # Columns of `Touches.found`, and rows of a group in `Tile.ends`: both balls, and the place in the lists.
 ONE, OTHER, PLACE, FOUND, ENDS = 0, 1, 2, 3, 3

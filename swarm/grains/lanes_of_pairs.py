@@ -99,7 +99,7 @@ def move_in(matter, rows, q, lane, difference):
 # --- At the start of a step ------------------------------------------------------------------------------
 
 # Rows that the contacts of a group read at the start: `place`, `speed` and the last columns of `spin` of both balls.
-# Then the rows that they write, as `_give` does: velocities by the impulses, and spins by the twists.
+# The rows that they write, as `_give` does, follow: velocities by the impulses, and spins by the twists.
 _PLACE, _SPEED, _TURNS = 0, 16, 32
 _IMPULSES, _TWISTS, _READ = 40, 48, 56
 

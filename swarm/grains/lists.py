@@ -37,7 +37,7 @@ class CellOrder(NamedTuple):
 
 def cells_of(centres: NDArray[np.float64], reach: float, period: Any) -> tuple[CellOrder, NDArray[np.int64]]:
     """Return the `CellOrder` of centres (N, 3) with cells no narrower than a reach, and the order of balls by cell."""
-    # By columns: NumPy takes ten times as long for rows of three numbers.
+    # Extremes are taken by columns, as NumPy takes ten times as long for rows of three numbers.
     x, y, z = centres.T
     low, high = np.array([[k.min(), k.max()] for k in (x, y, z)]).T if len(centres) else np.zeros((2, 3))
     wraps = np.zeros(3, np.bool_)

@@ -161,7 +161,7 @@ class Standstill:
         elapsed, advanced = self._shares.lately()
         if self._has_warned or elapsed < LOOK:
             return
-        # Only if slow twice in a row, as other work of the machine may last as long.
+        # A run must be slow twice in a row, as other work of the machine may last as long.
         was_slow, self._is_slow = self._is_slow, advanced * _A_MONTH < (1.0 - share) * elapsed
         if not (was_slow and self._is_slow):
             return

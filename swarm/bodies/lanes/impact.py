@@ -52,7 +52,7 @@ def restore(bodies, state, i):
             fall -= mass * bodies.rule.gravity[x] * r[3 * p + x, i]
     lost = state.energy[number] + state.work[number] - state.dissipated[number] - (kinetic + fall + elastic)
     if abs(lost) <= ENERGY_OF_IMPACT * (kinetic + abs(fall) + elastic) and kinetic > 0.0:
-        # Only to first order, as a body at rest has no velocity to scale.
+        # The correction is of first order only, as a body at rest has no velocity to scale.
         factor = 0.5 * lost / kinetic
         if factor * factor <= EPSILON:
             for row in range(v.shape[0]):

@@ -135,7 +135,7 @@ def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Fl
     kinds = kinds_of(particles, laws.may_wait)
     if laws.may_wait:
         flock = flock._replace(holds=1.0)
-    # Also without a loss of energy, as balls may start at rest on a floor.
+    # Rest is also possible without a loss of energy, as balls may start at rest on a floor.
     repose = None if scene.gravity is None else repose_of(math.hypot(*scene.gravity), particles.radius)
     made = Domain(scenery.given, laws, scene.pull(), grid, kinds, loss, shortest, repose=repose, turning=turning)
     return made, flock, epoch
@@ -154,7 +154,7 @@ def kinds_of(particles: Particles, may_be_held: bool) -> Any:
 
 def speed_of(scene: Scene, particles: Particles) -> float:
     """The root mean square speed of balls at the start, or the speed of the fastest wall if larger [m/s]."""
-    # Row by row: the squares of all components at once would for a moment be the largest array of the run.
+    # Rows are squared one by one; the squares of all components would for a moment be the largest array of the run.
     squares = np.zeros(len(particles))
     for row in particles.velocity:
         squares += row * row

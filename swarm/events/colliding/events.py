@@ -29,7 +29,7 @@ from .rows import DUE, FLOATS, LEAVES, MEETS, MET, NO_PARTNER, PARTNER, SEEN, ST
 from .striking import renew_ended, shift_leases, strike_heavy
 from .window import END, HELD, OUT
 
-# With this number of events a ball at one time, time does not pass at all.
+# Time does not pass at all if a ball has this number of events at one time.
 _AT_ONCE = 1000
 # Counts of 32 bits begin anew after this number of events, each of which adds a few at most. Two balls pass 2^31 in
 # less than an hour, and a row has no room for longer numbers.

@@ -27,7 +27,7 @@ _CELLS, _MOST = 27, 128
 FIXED = 2.0**200
 # The most parts of a fall beside a held ball; in each part a hit is certain or excluded.
 _PARTS = 100
-# In place of a face: all cells around a ball.
+# This stands for all cells around a ball, in place of a face.
 _ANY = 6
 
 

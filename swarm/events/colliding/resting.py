@@ -17,7 +17,7 @@ from .clock import IMPACTS, RESTED, SINCE, SLOW, moment_of
 _LOG = logging.getLogger("swarm")
 # Balls rest if each has more than `LEAST_RATE` impacts in the time in which a ball falls its radius R, and the part
 # `_SHARE` of them is slow, with at most the part `_PART` of the speed of this fall. Balls of this speed have as many
-# impacts where gaps are less than R/500: in no gas.
+# impacts only where gaps are less than R/500, which they are in no gas.
 LEAST_RATE, _SHARE, _PART = 100.0, 0.9, 0.1
 # The impacts a ball between two tests, and the least number of all balls, as a ball that crosses a corner has several.
 _COUNTED, _FEWEST = 32, 256

@@ -28,7 +28,7 @@ MEETS, LEAVES, DUE, _TWICE = 0, 1, 2, 3
 # when the collision was found; how often the velocity of the ball has changed, and how often it has collided; its cell;
 # the wall.
 PARTNER, SEEN, STAMP, MET, CELL, WALL = 8, 9, 10, 11, 12, 15
-# In place of a ball: none. In place of a number of changes: one that no ball has.
+# The first number stands for no ball, the second one for a number of changes that no ball has.
 NO_PARTNER, NEVER = -1, -1
 
 

@@ -24,8 +24,8 @@ from .rows import FLOATS, LEAVES
 
 # Entries of a window: its end [s of the epoch] and its length [s], the number of instants up to its end, its end [s].
 END, SPAN, PASSED, MOMENT, WINDOW = 0, 1, 2, 3, 4
-# In place of the number of a wall: no wall is known yet; the ball has left the walls; from `HELD` on downwards a wall
-# holds the ball.
+# These stand in place of the number of a wall: no wall is known yet; the ball has left the walls; a wall holds the
+# ball, from `HELD` on downwards.
 UNKNOWN, OUT, HELD = -2.0, -3.0, -4.0
 
 

@@ -30,9 +30,9 @@ from ...surfaces.time_of_impact import flights, safe
 from .freedoms import ParticleFlight
 from .strikes import all_stay, exit_at, first_hit, reach_of_all, strike, with_energy
 
-# In place of the number of a reacting wall: no impact was found, so that the particle is predicted again.
+# This stands for no reacting wall: no impact was found, so that the particle is predicted again.
 NONE = -1.0
-# In place of the number of another wall: the particle waits at a wall, or is not born yet.
+# This stands for no other wall: the particle waits at a wall, or is not born yet.
 WAITS = -2.0
 # Entries of a clock: the time in the frame, the time before the frame, the strikes of reacting walls in the run, and
 # the events since the leases began.

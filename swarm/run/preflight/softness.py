@@ -64,7 +64,7 @@ def _penalty(method: Method, depth: float, allowed: float) -> float:
     """Return the penalty with which a contact has the allowed depth [m], rounded up to two digits."""
     a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
     enough = float(alpha * math.pow(depth / allowed, a + 1.0))
-    # Rounded up, so that the penalty in the sentence is enough.
+    # The penalty is rounded up, so that the one in the sentence is enough.
     unit = 10.0 ** (math.floor(math.log10(enough)) - 1)
     return math.ceil(enough / unit) * unit
 
@@ -217,7 +217,7 @@ def _stored(method: Method, surface: Surface, place: Floats, moment: float) -> f
 def _entry(surface: Surface, place: Floats, velocity: Floats, moment: float) -> tuple[Floats, Floats]:
     """Estimate where a straight way to a place came through the wall; return this place and the inward unit normal."""
     side, way = side_of(surface), velocity / math.hypot(*velocity)
-    # From near to far, as the way may have begun in the wall.
+    # Lengths go from near to far, as the way may have begun in the wall.
     lengths = np.concatenate([[-1.0, 0.0], np.geomspace(1e-4, 10.0, 2000)]) * surface.size()
     back = place[:, None] - lengths * way[:, None]
     outside = side * surface.phi(back, moment) <= 0.0
