@@ -26,7 +26,7 @@ from swarm.compiled_scene import MOST_WALLS
 from swarm.kernel import arrays, cache, compiling, lines, machine_code
 from swarm.kernel import jit as _jit
 from swarm.kernel.arrays import kept
-from swarm.kernel.compilers import _DEEPEST, deep, features_of
+from swarm.kernel.compilers import _DEEPEST, _Kernel, deep, features_of
 from swarm.kernel.gravity import Gravity, accelerated, displacement, potential
 from swarm.kernel.jit import select
 from swarm.kernel.record import Record
@@ -386,9 +386,10 @@ def quartered(x):
 @compiled_only
 def test_only_kernels_become_machine_code(monkeypatch, tmp_path):
     made = []
-    for step in ("_optimize_final_module", "_finalize_specific"):
-        numbas = getattr(JITCodeLibrary, step)
-        monkeypatch.setattr(JITCodeLibrary, step, lambda self, numbas=numbas: made.append(self.name) or numbas(self))
+    optimize, finalize = "_optimize_final_module", "_finalize_specific"
+    for library, step in ((JITCodeLibrary, optimize), (_Kernel, optimize), (JITCodeLibrary, finalize)):
+        known = getattr(library, step)
+        monkeypatch.setattr(library, step, lambda self, known=known: made.append(self.name) or known(self))
     monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
     assert _jit.kernel(one_more_quarter)(1.0) == 1.25
     assert made == ["one_more_quarter"] * 2

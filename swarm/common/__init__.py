@@ -1,1 +1,1 @@
-"""What all parts of the package share: checks, frames, tables of names."""
+"""Common parts of the package: checks, frames, tables of names."""

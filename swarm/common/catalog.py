@@ -1,32 +1,32 @@
-"""The observables that runs have: unit, axes and meaning of each, which files, tables, pictures and the guide read."""
+"""The observables of runs: the unit, axes and meaning of each, for files, tables, pictures and the guide."""
 
 from typing import Any, Literal, NamedTuple
 
 from .checks import closest
 
-# The length of an axis that is the same in every run; the other axes have one entry for each surface, part and so on.
+# The lengths of axes that are the same in every run; the other axes have one entry for each surface, part and so on.
 LENGTHS = {"sense": 2, "axis": 3, "quaternion": 4}
-# The names of the entries of the last axis of a vector, and of an orientation.
+# The names of the entries along the last axis of a vector, and of an orientation.
 _COMPONENTS = {"axis": ("x", "y", "z"), "quaternion": ("w", "x", "y", "z")}
 
-# What particles of pictures and recordings are coloured by.
+# The quantities by which particles of pictures and recordings are coloured.
 COLOURINGS = ("speed", "energy-error")
 
 Axis = Literal["surface", "part", "member", "cavity", "source", "counter", "sense", "axis", "quaternion"]
 
 
 class Observable(NamedTuple):
-    """What is known of an observable in every run that has it.
+    """The description of an observable in every run that has it.
 
     Attributes:
-        unit: in SI units, as xarray and pint read it; "1" of numbers.
-        meaning: what it is, in words.
+        unit: in SI units, as xarray and pint read it; "1" for numbers.
+        meaning: its meaning in words.
         axes: its axes besides the time.
-        joined: the value of a run in shards, of those of the shards: their "sum", the "largest", or the "same" in each.
+        joined: how the value of a run in shards follows from the shards: their "sum", the "largest", or the "same".
         every: whether files of every version have it.
-        main: whether it is among those that a sweep shows.
+        main: whether a sweep shows it.
         may_be_nan: whether NaN is one of its values.
-        instead: what to use in a run without it, for the sentence of an error.
+        instead: the advice for a run without it, for the message of an error.
     """
 
     unit: str
@@ -39,7 +39,7 @@ class Observable(NamedTuple):
     instead: str = ""
 
     def components(self) -> tuple[str, ...] | None:
-        """The names of the entries of its last axis; None if they have numbers.
+        """Return the names of the entries of its last axis; None if they have numbers.
 
         >>> OBSERVABLES["momentum"].components(), OBSERVABLES["impulse"].components()
         (('x', 'y', 'z'), None)
@@ -47,16 +47,16 @@ class Observable(NamedTuple):
         return _COMPONENTS.get(self.axes[-1]) if self.axes else None
 
     def shape(self, lengths: dict[str, int]) -> tuple[int | None, ...]:
-        """The shape of an entry, where `lengths` has the lengths of axes such as "surface"; None: any length."""
+        """Return the shape of an entry, with the `lengths` of axes such as "surface"; None: any length."""
         return tuple((LENGTHS | lengths).get(axis) for axis in self.axes)
 
     def axes_in_words(self) -> list[str]:
-        """The lengths of its axes, in words where they differ between runs."""
+        """Return the lengths of its axes, in words if they differ between runs."""
         plural = {axis: f"{axis[:-1]}ies" if axis.endswith("y") else f"{axis}s" for axis in self.axes}
         return ["frames", *(str(LENGTHS.get(axis, plural[axis])) for axis in self.axes)]
 
 
-# In the order in which a sweep shows them: first what a scene has openings, absorbing walls or counters for.
+# In the order in which a sweep shows them: first those of openings, absorbing walls and counters.
 OBSERVABLES: dict[str, Observable] = {
     "time": Observable("s", "time of the frame", joined="same"),
     "escaped": Observable("1", "particles that left through openings", every=True, main=True),
@@ -109,9 +109,11 @@ OBSERVABLES: dict[str, Observable] = {
     "member_heat": Observable("J", "heat from the member since the start", ("member",)),
     "member_absorbed": Observable("1", "particles that a law of the member has absorbed", ("member",)),
     "crossed_momentum": Observable(
-        "kg m s-1", "momentum of what crossed the counter: out, back", ("counter", "sense", "axis")
+        "kg m s-1", "momentum of the particles that crossed the counter: out, back", ("counter", "sense", "axis")
     ),
-    "crossed_energy": Observable("J", "kinetic energy of what crossed the counter: out, back", ("counter", "sense")),
+    "crossed_energy": Observable(
+        "J", "kinetic energy of the particles that crossed the counter: out, back", ("counter", "sense")
+    ),
     "crossed_slowness": Observable("s m-1", "sum of 1/|v_n| at the counter: out, back", ("counter", "sense")),
     "wall_energy": Observable("J", "energy of the wall with a mass", ("surface",)),
     "wall_position": Observable("m", "displacement of the surface that moves", ("surface", "axis"), joined="same"),
@@ -126,7 +128,7 @@ OBSERVABLES: dict[str, Observable] = {
 CHUNK_SUMS = "chunk_sums"
 NAMES = frozenset((*OBSERVABLES, CHUNK_SUMS))
 MAIN = tuple(name for name, one in OBSERVABLES.items() if one.main)
-# The errors that every run has: 0, or those of round-off, if all went well.
+# The errors that every run has: 0, or round-off, if all went well.
 ERRORS = tuple(name for name, one in OBSERVABLES.items() if one.every and one.joined == "largest")
 
 
@@ -136,7 +138,7 @@ def may_be_nan(name: str) -> bool:
 
 
 class Observables(dict[str, Any]):
-    """The observables of a run by their names: an unknown name is a `KeyError` that says which there are.
+    """The observables of a run by their names; an unknown name is a `KeyError` that lists them.
 
     >>> Observables(impacts=3)["impact"]
     Traceback (most recent call last):
@@ -152,7 +154,7 @@ class Observables(dict[str, Any]):
 
 
 def markdown() -> list[str]:
-    """The table of the guide, in lines of Markdown.
+    """Return the table of the guide, in lines of Markdown.
 
     >>> markdown()[2]
     '| `time` | s | frames | time of the frame |'

@@ -19,18 +19,18 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SceneError
 
 Vector = tuple[float, float, float]
-# Magnitudes with squares and inverse squares that are finite.
+# Bounds of magnitudes with finite squares and inverse squares.
 SMALLEST, LARGEST = 1e-100, 1e100
 # Bytes for each particle in a run (`python -m bench bars`), and a number of particles that fits into every memory.
 PARTICLE, FEW = 146, 1_000_000
 _DOUBLE = 8
-# Characters of a value that are shown in a sentence.
+# Characters of a value that a message shows.
 _SHOWN = 200
-# The beginning of a sentence about an argument, or about a part of it.
+# The beginning of a message about an argument, or about a part of it.
 _ARGUMENT = re.compile(r"[a-z_]\w*(\[\d+\])*(\.[a-z_]\w*(\[\d+\])*)*( must | has | is |: )")
-# The part of two names that is alike where one is taken for the other.
+# The similarity of two names from which one is taken for the other.
 _SIMILAR = 0.54
-# What names of arguments and kinds are called elsewhere.
+# Other names for arguments and kinds.
 _OTHER_WORDS = {
     "friction": "mu mu_s mu_d cof",
     "restitution": "e cor eps bounce",
@@ -60,20 +60,20 @@ _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0
 
 
 def shown(value: Any) -> str:
-    """The `repr` of a value, in one line of at most 200 characters, for the sentence of an error.
+    """Return the `repr` of a value, in one line of at most 200 characters, for the message of an error.
 
     >>> shown(np.zeros((2, 2)))
     'array([[0., 0.], [0., 0.]])'
     """
     try:
         text = repr(value)
-    except Exception:  # of an object of others, or a number of too many digits
+    except Exception:  # an object with errors, or a number of too many digits
         return f"a {type(value).__name__}"
     return " ".join(text.split())[:_SHOWN]
 
 
 def assign(frozen: Any, **values: Any) -> None:
-    """Set fields of a frozen dataclass, as they have been checked."""
+    """Set fields of a frozen dataclass to checked values."""
     for name, value in values.items():
         object.__setattr__(frozen, name, value)
 
@@ -85,13 +85,13 @@ def of_class(name: str, value: Any, cls: type[Any]) -> None:
 
 
 def is_masked(value: Any) -> bool:
-    """Whether a value is a masked array. Before `numpy.ma` is imported, which takes 8 ms, there are no such arrays."""
+    """Whether a value is a masked array; none exist before `numpy.ma` is imported, which takes 8 ms."""
     module = sys.modules.get("numpy.ma")
     return module is not None and isinstance(value, module.MaskedArray)
 
 
 def number(name: str, value: Any, expected: str = "a finite number") -> float:
-    """`value` as a finite float."""
+    """Return `value` as a finite float."""
     try:
         # float() would take the last two, and drop the imaginary part or the mask.
         if isinstance(value, (bool, str, bytes, np.complexfloating)) or is_masked(value):
@@ -105,7 +105,7 @@ def number(name: str, value: Any, expected: str = "a finite number") -> float:
 
 
 def positive(name: str, value: Any) -> float:
-    """`value` as a finite float above zero."""
+    """Return `value` as a finite float above zero."""
     result = number(name, value, "a finite number above 0")
     if result <= 0.0:
         raise SceneError(f"{name} must be above 0, got {result:g}")
@@ -113,7 +113,7 @@ def positive(name: str, value: Any) -> float:
 
 
 def at_least(name: str, value: Any, bound: float) -> float:
-    """`value` as a finite float not below `bound`."""
+    """Return `value` as a finite float not below `bound`."""
     result = number(name, value, f"a finite number, {bound:g} or more")
     if result < bound:
         raise SceneError(f"{name} must be {bound:g} or more, got {result:g}")
@@ -121,7 +121,7 @@ def at_least(name: str, value: Any, bound: float) -> float:
 
 
 def length(name: str, value: Any) -> float:
-    """`value` as a length [m] above zero; its square is finite and not zero."""
+    """Return `value` as a length [m] above zero; its square is finite and not zero."""
     result = positive(name, value)
     if not SMALLEST <= result <= LARGEST:
         raise SceneError(f"{name} must be between {SMALLEST:g} and {LARGEST:g} m, got {result:g}")
@@ -129,7 +129,7 @@ def length(name: str, value: Any) -> float:
 
 
 def magnitude(name: str, value: Any) -> float:
-    """`value` as a number, 0 or more, with a finite square."""
+    """Return `value` as a number, 0 or more, with a finite square."""
     result = at_least(name, value, 0.0)
     if result > LARGEST:
         raise SceneError(f"{name} must be at most {LARGEST:g}, got {result:g}")
@@ -137,12 +137,12 @@ def magnitude(name: str, value: Any) -> float:
 
 
 def positive_magnitude(name: str, value: Any) -> float:
-    """`value` as a number above zero with a finite square."""
+    """Return `value` as a number above zero with a finite square."""
     return magnitude(name, positive(name, value))
 
 
 def part(name: str, value: Any, least: float = 0.0) -> float:
-    """`value` as a number from the least one to 1."""
+    """Return `value` as a number from `least` to 1."""
     result = number(name, value, f"a number from {least:g} to 1")
     if not least <= result <= 1.0:
         raise SceneError(f"{name} must be from {least:g} to 1, got {result:g}")
@@ -150,14 +150,14 @@ def part(name: str, value: Any, least: float = 0.0) -> float:
 
 
 def bounded(name: str, value: Any) -> float:
-    """`value` as a number of either sign, with a finite square."""
+    """Return `value` as a number of either sign, with a finite square."""
     result = number(name, value)
     magnitude(f"|{name}|", abs(result))
     return result
 
 
 def count(name: str, value: Any, least: int = 1) -> int:
-    """`value` as an integer not below `least`."""
+    """Return `value` as an integer not below `least`."""
     try:
         if isinstance(value, (bool, np.bool_)) or is_masked(value):
             raise TypeError
@@ -170,7 +170,7 @@ def count(name: str, value: Any, least: int = 1) -> int:
 
 
 def seed(name: str, value: Any) -> int:
-    """`value` as the seed of random numbers: an integer from 0 to 2**64 - 1."""
+    """Return `value` as the seed of random numbers: an integer from 0 to 2**64 - 1."""
     result = count(name, value, least=0)
     if result >= 1 << 64:
         raise SceneError(f"{name} must be below 2**64, got {min(result, 10**300):.6g}")
@@ -179,7 +179,7 @@ def seed(name: str, value: Any) -> int:
 
 @functools.cache
 def memory() -> int:
-    """Memory of this machine [bytes]."""
+    """Return the memory of this machine [bytes]."""
     if hasattr(os, "sysconf"):
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     import psutil  # on Windows
@@ -188,7 +188,7 @@ def memory() -> int:
 
 
 def in_bytes(size: float) -> str:
-    """A number of bytes in a suitable unit.
+    """Return a number of bytes in a suitable unit.
 
     >>> in_bytes(1.46e14)
     '146 TB'
@@ -204,20 +204,20 @@ def _too_large(name: str, given: str, size: float) -> SceneError:
 
 
 def require_memory(name: str, given: str, size: float) -> None:
-    """Raise a `SceneError` if an argument of so many bytes does not fit in the memory of this machine."""
+    """Raise a `SceneError` if an argument of `size` bytes does not fit in the memory of this machine."""
     if size > memory():
         raise _too_large(name, given, size)
 
 
 def particles_fit(name: str, count: int) -> None:
-    """Raise a `SceneError` if this many particles do not fit in the memory of this machine."""
+    """Raise a `SceneError` if `count` particles do not fit in the memory of this machine."""
     count = min(count, 10**300)  # which float() can convert
     if count > FEW:
         require_memory(name, f", got {count:.6g} particles, which take", PARTICLE * count)
 
 
 def duration(name: str, value: str) -> float:
-    """A time such as "2h", "1h30m", "45 min" or "90" (seconds), in seconds above 0."""
+    """Return a time such as "2h", "1h30m", "45 min" or "90" (seconds) in seconds above 0."""
     parts = re.findall(r"(\d+\.?\d*)\s*([a-z]*)\s*", value)
     known = all(unit in _SECONDS for _number, unit in parts)
     if not known or not re.fullmatch(r"(\d+\.?\d*\s*[a-z]*\s*)+", value):
@@ -226,7 +226,7 @@ def duration(name: str, value: str) -> float:
 
 
 def path_of(name: str, value: Any) -> Path:
-    """The argument `name` as the path of a file.
+    """Return the argument `name` as the path of a file.
 
     Raises:
         SceneError: it is not a path, it is empty, or it is too long for the system.
@@ -252,14 +252,14 @@ def require_short(name: str, path: Path, longest: Path) -> None:
 
 
 def flag(name: str, value: Any) -> bool:
-    """`value` as true or false."""
+    """Return `value` as true or false."""
     if not isinstance(value, (bool, np.bool_)):
         raise SceneError(f"{name} must be true or false, got {shown(value)}")
     return bool(value)
 
 
 def parts_of(value: Any) -> tuple[Any, ...] | None:
-    """The items of an iterable as a tuple; None for a text, for a class and for what is not iterable.
+    """Return the items of an iterable as a tuple; None for a text, a class and a value that is not iterable.
 
     >>> parts_of(np.array(5.0)) is None, parts_of([1, 2])
     (True, (1, 2))
@@ -268,12 +268,12 @@ def parts_of(value: Any) -> tuple[Any, ...] | None:
         return None
     try:
         return tuple(value)
-    except Exception:  # an array without axes, or an object of others
+    except Exception:  # an array without axes, or an object with errors
         return None
 
 
 def list_of(name: str, value: Any, expected: str, *one: type[Any]) -> tuple[Any, ...]:
-    """`value` as a tuple; an instance of the class `one`, which may be iterable itself, is refused."""
+    """Return `value` as a tuple; refuse an instance of the class `one`, which may be iterable itself."""
     given = None if isinstance(value, one) else parts_of(value)
     if given is None:
         raise SceneError(f"{name} must be a list of {expected}, got {shown(value)}{brackets(value)}")
@@ -281,7 +281,7 @@ def list_of(name: str, value: Any, expected: str, *one: type[Any]) -> tuple[Any,
 
 
 def brackets(value: Any) -> str:
-    """A hint where a class was given in place of an object, or an empty text.
+    """Return a hint if a class was given in place of an object, or an empty text.
 
     >>> brackets(float)
     '; to make one of the class, call it: float(...)'
@@ -290,11 +290,11 @@ def brackets(value: Any) -> str:
 
 
 def entries(name: str, value: Any, count: int, expected: str) -> tuple[Any, ...]:
-    """`value` as a tuple of `count` parts; `expected` says what they are."""
+    """Return `value` as a tuple of `count` parts; `expected` describes them."""
     try:
-        # One more than there should be: what has no end is refused as well.
+        # One more than expected, to refuse an endless iterable.
         parts = tuple(itertools.islice(value, count + 1))
-    except Exception:  # it has no parts, or is an object of others
+    except Exception:  # it has no parts, or is an object with errors
         raise SceneError(f"{name} must be {expected}, got {shown(value)}") from None
     if len(parts) != count:
         came = len(value) if isinstance(value, (list, tuple)) else len(parts) if len(parts) < count else "more"
@@ -303,7 +303,7 @@ def entries(name: str, value: Any, count: int, expected: str) -> tuple[Any, ...]
 
 
 def vector(name: str, value: Any) -> Vector:
-    """`value` as three finite floats."""
+    """Return `value` as three finite floats."""
     if isinstance(value, (str, bytes)):
         raise SceneError(f"{name} must be three numbers, got {shown(value)}")
     x, y, z = (number(f"{name}[{i}]", part) for i, part in enumerate(entries(name, value, 3, "three numbers")))
@@ -311,13 +311,13 @@ def vector(name: str, value: Any) -> Vector:
 
 
 def three_lengths(name: str, value: Any) -> Vector:
-    """`value` as three lengths [m] above zero."""
+    """Return `value` as three lengths [m] above zero."""
     x, y, z = (length(f"{name}[{i}]", part) for i, part in enumerate(vector(name, value)))
     return x, y, z
 
 
 def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    """`value` as an array of floats."""
+    """Return `value` as an array of floats."""
     parts = value if isinstance(value, (list, tuple)) else (value,)
     if any(map(is_masked, parts)):
         raise SceneError(f"{name} must be an array without a mask, got a masked one; remove or fill the masked entries")
@@ -328,14 +328,14 @@ def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
         # A broadcast view of one number can have any shape: it is not copied if it would not fit.
         if _DOUBLE * given.size <= memory():
             return given.astype(np.float64, copy=False)
-    except Exception:  # of float(), or of an object of others
+    except Exception:  # of float(), or of an object with errors
         came = value.dtype.name if isinstance(value, np.ndarray) else type(value).__name__
         raise SceneError(f"{name} must be an array of numbers, got {came}") from None
     raise _too_large(name, f", got shape {given.shape}, which takes", _DOUBLE * given.size)
 
 
 def one_of(name: str, value: Any, choices: Iterable[str]) -> str:
-    """`value` if it is one of `choices`; otherwise the error names the closest of them."""
+    """Return `value` if it is one of `choices`; otherwise the error names the closest choice."""
     known = list(choices)
     if isinstance(value, str) and value in known:
         return value
@@ -343,7 +343,7 @@ def one_of(name: str, value: Any, choices: Iterable[str]) -> str:
 
 
 def closest(value: Any, known: Iterable[str]) -> str:
-    """The hint "; did you mean ...?" with the name of the same meaning, or the most similar one, or an empty text.
+    """Return the hint "; did you mean ...?" with a synonym or the most similar name, or an empty text.
 
     >>> closest("mu", ("restitution", "friction")), closest("raduis", ("radius", "center")), closest("x", ("radius",))
     ("; did you mean 'friction'?", "; did you mean 'radius'?", '')
@@ -355,7 +355,7 @@ def closest(value: Any, known: Iterable[str]) -> str:
 
 
 def known_keys(where: str, table: Iterable[str], known: Collection[str], hints: Mapping[str, str] = {}) -> None:
-    """Raise a `SceneError` for a key of a table that is not known; `hints` are those of keys of other tables.
+    """Raise a `SceneError` for an unknown key of a table; `hints` are for keys that belong to other tables.
 
     >>> known_keys("run.", {"untill": 1.0}, ("until", "every"))
     Traceback (most recent call last):
@@ -368,7 +368,7 @@ def known_keys(where: str, table: Iterable[str], known: Collection[str], hints: 
 
 
 def located(where: str, error: object) -> str:
-    """The sentence about a part, after its place: behind a dot where the sentence begins with an argument.
+    """Return a message about a part after its place, joined by a dot if it begins with an argument.
 
     >>> located("surface[0]", "radius must be above 0"), located("surface[0]", "cannot read the mesh part.stl")
     ('surface[0].radius must be above 0', 'surface[0]: cannot read the mesh part.stl')
@@ -377,6 +377,6 @@ def located(where: str, error: object) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """The names in quotes, joined by commas and "and": 'a', 'b' and 'c'."""
+    """Return the names in quotes, joined by commas and "and": 'a', 'b' and 'c'."""
     quoted = [repr(name) for name in names]
     return " and ".join([", ".join(quoted[:-1]), quoted[-1]]) if len(quoted) > 1 else "".join(quoted)

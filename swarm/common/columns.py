@@ -1,4 +1,4 @@
-"""Columns of numbers, by their names: from a CSV file, and of observables."""
+"""Named columns of numbers, from a CSV file and of observables."""
 
 import csv
 import io
@@ -19,21 +19,21 @@ if TYPE_CHECKING:
     import pandas
 
 _NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*")
-# Columns of numbers above 0.
+# Columns with numbers above 0.
 _POSITIVE = {"mass", "radius", "length", "half_x", "half_y", "half_z", "a", "b", "c"}
 
-# The names of the entries of the last axis of a column of a log.
+# The names of the entries along the last axis of a column of a log.
 _OF_LOGS = dict.fromkeys(("position", "velocity_before", "velocity_after", "slip", "image", "spin"), ("x", "y", "z"))
 
 
 def flattened(observables: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    """A column for each number of observables, which have one entry a frame, but those of members; "time" first.
+    """Return a column for each number of a frame's observables, except those of members; "time" is the first.
 
     >>> list(flattened({"momentum": np.zeros((2, 3)), "impulse": np.zeros((2, 2)), "time": np.arange(2)}))
     ['time', 'momentum_x', 'momentum_y', 'momentum_z', 'impulse_0', 'impulse_1']
     """
     columns = {}
-    # Those of members would be too many.
+    # The columns of members would be too many.
     written = [name for name in observables if not name.startswith("member_")]
     for name in sorted(written, key=lambda name: name != "time"):
         values = np.asarray(observables[name])
@@ -47,7 +47,7 @@ def flattened(observables: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
 
 
 def frame_of(observables: Mapping[str, Any]) -> "pandas.DataFrame":
-    """The observables as a pandas frame, a row for each frame."""
+    """Return the observables as a pandas frame, a row for each frame."""
     with needed_by("a table", "table"):
         import pandas
 
@@ -57,13 +57,13 @@ def frame_of(observables: Mapping[str, Any]) -> "pandas.DataFrame":
 def read_columns(
     path: str | Path, needed: Sequence[str], optional: Sequence[str], what: str, ignored: Sequence[str] = ()
 ) -> dict[str, NDArray[np.float64]]:
-    """The columns of a CSV file with a header, in any order, one row for each `what`.
+    """Return the columns of a CSV file with a header, in any order, one row for each `what`.
 
-    Those that are `ignored` may be there and hold anything.
+    Columns that are `ignored` may have any contents.
 
     Raises:
-        SceneError: the file cannot be read, a column is missing or unknown, or a cell is not a number; names file, row
-            and column.
+        SceneError: the file cannot be read, a column is missing or unknown, or a cell is not a number; it names file,
+            row and column.
     """
     rows = _rows_of(path)
     header = [name.strip() for name in rows[0][1]] if rows else []
@@ -81,12 +81,12 @@ def read_columns(
 
 
 def row_of(path: str | Path, number: int) -> int:
-    """The row of a CSV file that holds the particle, or body, of this number."""
+    """Return the row of a CSV file with the particle, or body, of this number."""
     return _rows_of(path)[1 + number][0]
 
 
 def _rows_of(path: str | Path) -> list[tuple[int, list[str]]]:
-    """The rows of a CSV file that are not empty, with their numbers, from 1 on."""
+    """Return the rows of a CSV file that are not empty, with their numbers, from 1 on."""
     file = path_of("path", path)
     try:
         text = file.read_bytes()
@@ -102,7 +102,7 @@ def _rows_of(path: str | Path) -> list[tuple[int, list[str]]]:
 
 
 def _hint(header: list[str]) -> str:
-    """A guess at what is wrong with a header."""
+    """Return a guess at the fault in a header."""
     if not header:
         return ": the file is empty"
     got = f" in the first row, {','.join(header)!r:.60}"
@@ -121,7 +121,7 @@ def _row(path: str | Path, number: int, header: list[str], cells: list[str], ign
         if name in ignored:
             values.append(0.0)
             continue
-        # float() also takes what other programs do not write: 1_0, and the digits of all scripts.
+        # float() also takes forms that other programs do not write: 1_0, and the digits of all scripts.
         value = float(cell) if _NUMBER.fullmatch(cell) else np.nan
         if not np.isfinite(value):
             raise SceneError(f"{path}, row {number}, column {name!r}: expected a finite number, got {cell[:40]!r}")

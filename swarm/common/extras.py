@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from ..errors import SceneError
 
-# What walls are drawn with.
+# The packages that draw walls.
 _DRAWN = "contourpy scikit-image scipy"
-# The packages of each extra of pyproject.toml: all that an import within `needed_by` may lack.
+# The packages of each extra of pyproject.toml: all that may be missing in an import within `needed_by`.
 PACKAGES = {
     "record": f"rerun-sdk {_DRAWN}",
     "plot": f"matplotlib {_DRAWN}",
@@ -27,7 +27,7 @@ PACKAGES = {
 
 @contextlib.contextmanager
 def needed_by(what: str, extra: str) -> Iterator[None]:
-    """Imports in this context raise a SceneError that says what to install."""
+    """Raise a SceneError with the package to install if an import in this context fails."""
     try:
         yield
     except ModuleNotFoundError as error:

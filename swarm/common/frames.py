@@ -22,9 +22,9 @@ _LOG = logging.getLogger("swarm")
 _SAME_TIME = 1e-9
 # More frames than any run has, but finite.
 _MOST = 1e300
-# Bytes of a frame's observables: numbers in a file, Python objects in memory; and what each surface adds.
+# Bytes of a frame's observables: as numbers in a file, as Python objects in memory, and for each surface in addition.
 _NUMBERS, _OBJECTS, _SURFACE = 200, 3000, 16
-# Bytes in a file besides: its groups and the heads of its datasets, and the checksums of a frame.
+# Further bytes in a file: its groups and the heads of its datasets, and the checksums of a frame.
 _GROUPS, _CHECKSUMS = 55_000, 112
 # The frames for which a dataset of observables makes room at a time.
 ROWS = 1024
@@ -32,17 +32,17 @@ ROWS = 1024
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A finished frame: what `progress` and the functions of `observables` are called with, and `Result.frames` gives.
+    """A finished frame: the argument of `progress` and of functions in `observables`, and an entry of `Result.frames`.
 
-    The arrays of particles are copies, made when they are first read, and cannot be written. `progress` and functions
-    of `observables` read them during their call. Of bodies the particles are all points, of a trajectory those that it
-    keeps.
+    The arrays of particles are read-only copies, made when they are first read. `progress` and functions
+    of `observables` read them during their call. For bodies the particles are all points, for a trajectory those
+    that it keeps.
 
     Attributes:
         number: the number of the frame, from 0 on.
         time: its time [s].
         until: the end of the run [s].
-        observables: name -> value, in this frame; not available in a function of `observables`.
+        observables: name -> value in this frame; not available in a function of `observables`.
         written: number of frames in the trajectory.
 
     >>> import swarm
@@ -64,7 +64,7 @@ class Frame:
 
     @property
     def position(self) -> NDArray[np.float64]:
-        """(3, N) [m]; where the scene repeats, in the cell."""
+        """(3, N) [m]; in a periodic scene, in the cell."""
         return np.asarray(self._read("position"))
 
     @property
@@ -79,27 +79,27 @@ class Frame:
 
     @property
     def energy(self) -> NDArray[np.float64]:
-        """(N,) kinetic energy and that in gravity [J]."""
+        """(N,) sum of the kinetic energy and the energy in gravity [J]."""
         return np.asarray(self._read("energy"))
 
     @property
     def impacts(self) -> NDArray[np.int64]:
-        """(N,) how many each has had since 0 s."""
+        """(N,) number of impacts of each since 0 s."""
         return np.asarray(self._read("impacts"))
 
     @property
     def escape_time(self) -> NDArray[np.float64]:
-        """(N,) when each has passed an opening of a wall [s]; NaN of those inside."""
+        """(N,) time at which each has passed an opening of a wall [s]; NaN for those inside."""
         return np.asarray(self._read("escape_time"))
 
     @property
     def absorbed_time(self) -> NDArray[np.float64]:
-        """(N,) when a law of a wall has absorbed each [s]; NaN of the others."""
+        """(N,) time at which a law of a wall has absorbed each [s]; NaN for the others."""
         return np.asarray(self._read("absorbed_time"))
 
     @property
     def image(self) -> NDArray[np.int64] | None:
-        """(3, N) how many cells away each is where the scene repeats, else None."""
+        """(3, N) displacement of each from its place in the cell, in whole cells; None if not periodic."""
         found: NDArray[np.int64] | None = self._read("image")
         return found
 
@@ -117,7 +117,7 @@ class Frame:
 
     @property
     def collisions(self) -> NDArray[np.int64] | None:
-        """(N,) how often each ball has met another one since 0 s; None of points."""
+        """(N,) number of collisions of each ball with others since 0 s; None for points."""
         found: NDArray[np.int64] | None = self._read("collisions")
         return found
 
@@ -125,13 +125,13 @@ class Frame:
         return self.arrays.read(name, f"frame {self.number}")
 
     def apart(self) -> "Frame":
-        """A copy with its own observables, which the receiver may change."""
+        """Return a copy with its own observables, which the receiver may change."""
         return replace(self, observables=copy.deepcopy(self.observables))
 
 
 @dataclass(frozen=True)
 class FrameTimes(Validated):
-    """0, every, 2 every, ..., until: an iterator over number, the time before, and the time [s].
+    """0, every, 2 every, ..., until: an iterator over (number, last time, time) [s].
 
     Args:
         until: the end, above 0.
@@ -156,7 +156,7 @@ class FrameTimes(Validated):
 
     @property
     def count(self) -> int:
-        """Number of frames; it may be more than `len` can return."""
+        """The number of frames; it may exceed the largest `len`."""
         assert self.every is not None
         return 1 + max(1, math.ceil(min(self.until / self.every, _MOST) - _SAME_TIME))
 
@@ -169,12 +169,12 @@ class FrameTimes(Validated):
         yield self.count - 1, before, self.until
 
     def on_disk(self, surfaces: int) -> int:
-        """Bytes of a file without its particles: groups and the observables of all frames."""
+        """Return the bytes of a file without its particles: groups and the observables of all frames."""
         rows = -(-self.count // ROWS) * ROWS
         return _GROUPS + _CHECKSUMS * self.count + rows * (_NUMBERS + _SURFACE * surfaces)
 
     def in_memory(self, surfaces: int) -> int:
-        """Bytes of the observables of all frames in memory."""
+        """Return the bytes of the observables of all frames in memory."""
         return self.count * (_OBJECTS + _SURFACE * surfaces)
 
     def require_room(
@@ -186,9 +186,9 @@ class FrameTimes(Validated):
             first: number of the first frame that is kept.
             target: the trajectory, or None.
             numbers: bytes of the particles in a frame.
-            surfaces: their number.
-            packed: whether these are compressed, so that their size is unknown; observables never are.
-            more: bytes of the observables of a frame that not every run has.
+            surfaces: the number of surfaces.
+            packed: whether particles are compressed, so that their size is unknown; observables never are.
+            more: bytes of further observables of a frame, which not every run has.
         """
         frames = self.count - first
         if target is None:

@@ -1,4 +1,4 @@
-"""SIGINT and SIGTERM while a run is under way."""
+"""The effect of SIGINT and SIGTERM during a run."""
 
 import contextlib
 import gc
@@ -11,14 +11,14 @@ from typing import Any
 
 from ..kernel.collection import uncollected
 
-# The exit code that a shell gives a process that SIGINT ended; the descriptor of standard error.
+# The exit code that a shell gives a process ended by SIGINT; the descriptor of standard error.
 _EXIT, _STDERR = 130, 2
 _DEFAULTS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 
 
 @contextlib.contextmanager
 def at_once() -> Iterator[None]:
-    """Let a SIGINT end the process with the word "interrupted" alone, exit code 130.
+    """Let a SIGINT end the process with only the word "interrupted", exit code 130.
 
     For imports and the last output of a command: an exception within an import may be lost, or become another one
     with a traceback.
@@ -36,10 +36,10 @@ def at_once() -> Iterator[None]:
 
 @contextlib.contextmanager
 def importing() -> Iterator[None]:
-    """`at_once` for the imports of a command, during which the garbage collector rests.
+    """`at_once` for the imports of a command, with the garbage collector disabled.
 
-    The collector would look through the modules again and again, which takes 40 ms. Objects that exist after the first
-    imports are never collected, as modules are not; later ones are.
+    Collections would go through the modules again and again, which takes 40 ms. Objects that exist after the first
+    imports are never collected, as modules are not; later objects are.
     """
     with uncollected(), at_once():
         try:
@@ -50,7 +50,7 @@ def importing() -> Iterator[None]:
 
 
 def leave_at_once() -> None:
-    """Let a SIGINT end the process from now on: all files are closed."""
+    """Let a SIGINT end the process from now on, as all files are closed."""
 
     def leave(number: int, frame: FrameType | None) -> None:
         os.write(_STDERR, b"interrupted\n")
@@ -62,10 +62,10 @@ def leave_at_once() -> None:
 
 @contextlib.contextmanager
 def taken_by(stop: Callable[[], None]) -> Iterator[None]:
-    """Let the first SIGINT or SIGTERM call `stop`; after that both have their default effect in Python.
+    """Let the first SIGINT or SIGTERM call `stop`, and restore the default effect of both in Python.
 
-    Python raises KeyboardInterrupt between any two of its instructions. Where that is inside a callback of the garbage
-    collector, which runs often while Numba compiles, the exception is printed and lost, and the run goes on.
+    Python raises KeyboardInterrupt between any two of its instructions. Inside a callback of the garbage collector,
+    which runs often while Numba compiles, the exception is printed and lost, and the run continues.
     """
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread may set handlers, and only it is interrupted

@@ -1,4 +1,4 @@
-"""Tables of classes by their kind in files; the module of a class is loaded when the class is asked for."""
+"""Tables of classes by their kinds in files; the module of a class is loaded when the class is first needed."""
 
 import importlib
 from collections.abc import Iterator, Mapping
@@ -11,7 +11,7 @@ class Kinds(Mapping[str, type[T]]):
     """Classes by their kinds.
 
     Args:
-        package: the package that has the table.
+        package: the package of the table.
         homes: kind -> the module in the package, a colon, and the class.
 
     >>> from swarm.surfaces import ALL_SURFACES
@@ -23,7 +23,7 @@ class Kinds(Mapping[str, type[T]]):
         self._package, self.homes = package, homes
 
     def __getitem__(self, kind: str) -> type[T]:
-        """The class of a kind."""
+        """Return the class of a kind."""
         module, _, name = self.homes[kind].partition(":")
         found: type[T] = getattr(importlib.import_module(f"{self._package}.{module}"), name)
         return found
@@ -35,12 +35,12 @@ class Kinds(Mapping[str, type[T]]):
         return len(self.homes)
 
     def kind_of(self, cls: type) -> str | None:
-        """The kind of a class; None: the table does not have it."""
+        """Return the kind of a class; None if it is not in the table."""
         home = f"{cls.__module__}:{cls.__qualname__}"
         return next((kind for kind, mine in self.homes.items() if home == f"{self._package}.{mine}"), None)
 
     def named(self, name: str) -> Any:
-        """The class of this name, for `__getattr__` of the package."""
+        """Return the class of this name, for `__getattr__` of the package."""
         for kind, home in self.homes.items():
             if home.endswith(f":{name}"):
                 return self[kind]

@@ -7,9 +7,9 @@ from typing import Any
 
 from ..errors import SceneError
 
-# Of the folder of the shards of a trajectory.
+# The suffix of the folder of the shards of a trajectory.
 SHARDS = ".shards"
-# The file of a shard as the trajectory of all names it, in the folder beside it.
+# The file of a shard, as the trajectory of all shards names it in the folder beside it.
 _SHARD = re.compile(rf"[^/\\:]+{re.escape(SHARDS)}/\d{{4,}}\.h5")
 
 
@@ -18,11 +18,11 @@ def require_none(file: Any, path: Path, joined: Sequence[str] = ()) -> None:
 
     Args:
         file: the file, open.
-        path: its path, for the sentence.
+        path: its path, for the message.
         joined: the datasets with values that may be in the shards of a trajectory.
 
     Raises:
-        SceneError: it has an external link, external storage, or a virtual dataset of another file.
+        SceneError: the file has an external link, external storage, or a virtual dataset of another file.
     """
     import h5py
 
@@ -34,7 +34,7 @@ def require_none(file: Any, path: Path, joined: Sequence[str] = ()) -> None:
         return True if found else None
 
     def look_at(name: bytes) -> bool | None:
-        # An object of h5py for each part would take most of the time.
+        # Opening an object of h5py for each part would take most of the time.
         one = h5py.h5o.open(file.id, name)
         made = one.get_create_plist() if isinstance(one, h5py.h5d.DatasetID) else None
         if made is not None and (made.get_external_count() or made.get_layout() == h5py.h5d.VIRTUAL):
@@ -51,10 +51,10 @@ def require_none(file: Any, path: Path, joined: Sequence[str] = ()) -> None:
 
 
 def _elsewhere(one: Any, name: str, joined: Sequence[str]) -> list[str]:
-    """What a dataset with values in other files is called in the sentence, or nothing."""
+    """Describe a dataset with values in other files for the message, or return nothing."""
     if one.external is not None:
         return [f"{name}, its values are in {one.external[0][0]!r:.200}"]
-    # The same file, and our shards.
+    # Other files than this one; shards of this run are allowed.
     others = (source.file_name for source in one.virtual_sources() if source.file_name != ".")
     wrong = [file for file in others if name not in joined or not _SHARD.fullmatch(file)]
     return [f"{name}, its values are in {file!r:.200}" for file in wrong[:1]]

@@ -10,7 +10,7 @@ _LEFT = ' style="text-align: left"'
 
 
 def table(title: str, rows: Iterable[Sequence[str]], header: Sequence[str] = ()) -> str:
-    """A table of texts; those of the header and of the first column are bold.
+    """Return a table of texts; those of the header and of the first column are bold.
 
     >>> print(table("A <ball>", [["radius", "0.5 m"]]).replace(_LEFT, ""))
     <table><caption>A &lt;ball&gt;</caption>
@@ -26,7 +26,7 @@ def table(title: str, rows: Iterable[Sequence[str]], header: Sequence[str] = ())
 
 
 def shortened(items: Sequence[Any], most: int = 8) -> list[str]:
-    """The texts of some items, or of the first of them and how many more there are.
+    """Return the texts of some items, or of the first of them and the number of the others.
 
     >>> shortened(["a", "b", "c", "d"], most=3)
     ['a', 'b', '<2 more>']

@@ -1,4 +1,4 @@
-"""Methods that compute their value once."""
+"""Methods that compute their value only once."""
 
 import functools
 from collections.abc import Callable
@@ -9,7 +9,7 @@ Value = TypeVar("Value")
 
 
 def once(method: Callable[[Owner], Value]) -> Callable[[Owner], Value]:
-    """A method without arguments that keeps its value in its object, which never changes.
+    """Return a method without arguments that keeps its value in its object, which never changes.
 
     >>> class Wall:
     ...     @once

@@ -1,4 +1,4 @@
-"""Checks of arguments that have a row for each of many bodies: each returns an array that stays as it is."""
+"""Checks of arguments with a row for each of many bodies: each returns an array that cannot be changed."""
 
 from collections.abc import Callable
 
@@ -9,19 +9,19 @@ from ..errors import SceneError
 from ..state import Floats
 from .checks import FEW, LARGEST, SMALLEST, array, require_memory
 
-# What a ball and another body take at most while their table and the grid of cells are made [bytes]: of balls these are
-# arrays (260 measured), of others an object for each first (2000 capsules, 2750 cylinders).
+# The most memory of a ball and of another body while their table and the grid of cells are made [bytes]: for balls
+# arrays (260 measured), for others first an object for each (2000 capsules, 2750 cylinders).
 _BALL, _BODY = 300, 3000
 
 
 def balls(name: str, value: ArrayLike) -> Floats:
-    """`value` as points (n, 3), one a ball."""
+    """Return `value` as points (n, 3), one for each ball."""
     return bodies(name, value, _BALL)
 
 
 def bodies(name: str, value: ArrayLike, each: int = _BODY) -> Floats:
-    """`value` as points (n, 3), one a body, which takes so many bytes."""
-    # With the grid they take more than the numbers themselves, which are looked at then.
+    """Return `value` as points (n, 3), one for each body, which takes `each` bytes."""
+    # With the grid the bodies take more than the numbers themselves, which are checked below.
     many = len(value) if isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim) else 0
     if many > FEW:
         require_memory(name, f" with the grid of their cells, got {many:.6g} bodies, which take", each * many)
@@ -37,7 +37,7 @@ def bodies(name: str, value: ArrayLike, each: int = _BODY) -> Floats:
 
 
 def lengths(name: str, value: ArrayLike, count: int) -> Floats:
-    """`value` as lengths (n,) above 0, or one for all bodies."""
+    """Return `value` as lengths (n,) above 0, given for each body or for all."""
     given = array(name, value)
     if given.ndim > 1 or (given.ndim == 1 and len(given) != count):
         raise SceneError(f"{name} must be one number or {count}, one for each of the centers, got shape {given.shape}")
@@ -49,22 +49,22 @@ def lengths(name: str, value: ArrayLike, count: int) -> Floats:
 
 
 def widths(name: str, value: ArrayLike, count: int) -> Floats:
-    """`value` as three lengths above 0 for each body (n, 3), or for all."""
+    """Return `value` as three lengths above 0 for each body (n, 3), given for each or for all."""
     return _rows(name, value, count, 3, lambda rows: (rows >= SMALLEST) & (rows <= LARGEST), "three lengths above 0 m")
 
 
 def directions(name: str, value: ArrayLike, count: int) -> Floats:
-    """`value` as a vector for each body (n, 3), or for all, not all 0."""
+    """Return `value` as a nonzero vector for each body (n, 3), given for each or for all."""
     return _rows(name, value, count, 3, _is_some, "three finite numbers, not all 0")
 
 
 def quaternions(name: str, value: ArrayLike, count: int) -> Floats:
-    """`value` as a quaternion for each body (n, 4), or for all, not all 0."""
+    """Return `value` as a nonzero quaternion for each body (n, 4), given for each or for all."""
     return _rows(name, value, count, 4, _is_some, "four finite numbers (w, x, y, z), not all 0")
 
 
 def _is_some(rows: Floats) -> NDArray[np.bool_]:
-    """Which rows have a length."""
+    """Return which rows are finite and not 0."""
     return np.asarray((np.abs(rows) <= LARGEST) & (rows != 0.0).any(axis=1)[:, None])
 
 
@@ -85,7 +85,7 @@ def _rows(
 
 
 def kept(values: Floats) -> Floats:
-    """A copy that stays as it is."""
+    """Return a copy that cannot be changed."""
     copy = np.array(values, np.float64)
     copy.setflags(write=False)
     return copy

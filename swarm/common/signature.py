@@ -1,6 +1,6 @@
-"""What `help` shows in lines of a terminal, signatures and docstrings; and errors that name the arguments there are.
+"""The text of `help`: signatures and docstrings in lines of a terminal; and errors that name the possible arguments.
 
-Public names get them when they are first used, see `__getattr__` of the package.
+Public names get it when they are first used, see `__getattr__` of the package.
 """
 
 import functools
@@ -16,33 +16,33 @@ from numpy.typing import ArrayLike
 from .checks import closest
 from .validated import bare
 
-# The columns of a terminal; the modules of a type, before its name.
+# The columns of a terminal; the modules before the name of a type.
 _COLUMNS, _MODULES = 80, re.compile(r"\b(?:\w+\.)+(?=[A-Za-z])")
-# What `help` puts before the lines of a docstring, and before those of a method.
+# The indents that `help` adds to the lines of a docstring, and to those of a method's.
 _INDENTED, _OF_METHOD = 4, 8
-# Headings of sections that have entries, the lines of these, and paragraphs that begin with a word and a colon.
+# Headings of sections with entries, the lines of entries, and paragraphs that begin with a word and a colon.
 _SECTION = re.compile(r"(Args|Attributes|Returns|Raises|Yields)\b[^:]*:$")
 _ENTRY = re.compile(r" {4}(?! )[*\w.\"-]+(, [*\w.\"-]+)*: ")
 _NOTE = re.compile(r"(Conserves|Order|Cost|Source|Reference): ")
-# What NumPy's name of all that becomes an array stands for: a line of 300 characters.
+# The meaning of NumPy's name for array-like arguments: a line of 300 characters.
 _ARRAY = inspect.formatannotation(ArrayLike)
-# An error of Python about the arguments of a call: the function, and what Python 3.13 proposes.
+# A Python error about the arguments of a call: the function, and the suggestion of Python 3.13.
 _CALLED, _PROPOSED = re.compile(r"^[\w.<>]+\(\)"), re.compile(r"\. Did you mean '\w+'\?$")
 _Kind = TypeVar("_Kind")
 _OF_NUMPY = re.compile(r"ndarray\[tuple\[Any, \.\.\.\], dtype\[(\w+)\]\]")
 
 
 class Lined(inspect.Signature):
-    """A signature: its text has a line for each parameter where one line would be too long."""
+    """A signature; its text has a line for each parameter if one line would be too long."""
 
-    # Of a line, less the name of the function and what `help` puts before it.
+    # The width without the name of the function and the indent that `help` adds.
     columns = _COLUMNS
 
     def __str__(self) -> str:
         return self.format()
 
     def format(self, *, max_width: int | None = None, **_more: Any) -> str:
-        """The text; a line is as wide as a terminal, or as `max_width`, for which Python 3.13 asks."""
+        """Return the text, in lines of the width of a terminal, or of `max_width`, which Python 3.13 sets."""
         returned = _short(str(inspect.Signature(return_annotation=self.return_annotation)))[2:]
         parts: list[str] = []
         named = False
@@ -58,7 +58,7 @@ class Lined(inspect.Signature):
 
 
 def _short(text: str) -> str:
-    """The text of an annotation without modules, and with the names that stand for long ones."""
+    """Return the text of an annotation without modules, and with short names for long ones."""
     text = re.sub(r"\btyping\.", "", text)
     inner = _ARRAY.removeprefix("typing.").removeprefix("Union[").removesuffix("]")
     for end, name in ((", NoneType]", "ArrayLike | None"), ("]", "ArrayLike")):
@@ -70,7 +70,7 @@ def _short(text: str) -> str:
 
 
 def in_columns(text: str, width: int = _COLUMNS - _INDENTED) -> str:
-    """A docstring with its paragraphs and entries in lines of so many characters; examples and tables stay.
+    """Return a docstring with its paragraphs and entries in lines of `width` characters; examples and tables stay.
 
     >>> in_columns("Conserves: the energy, and the momentum of all.", 24).splitlines()
     ['Conserves: the energy,', 'and the momentum of all.']
@@ -89,7 +89,7 @@ def in_columns(text: str, width: int = _COLUMNS - _INDENTED) -> str:
 
 
 def _blocks(lines: list[str]) -> list[tuple[int | None, list[str]]]:
-    """Paragraphs and entries of a docstring, with the indent of each; None of what stays as it is."""
+    """Return paragraphs and entries of a docstring with their indents; None for parts that stay as they are."""
     found: list[tuple[int | None, list[str]]] = []
     in_section = stays = False
     for line in lines:
@@ -112,7 +112,7 @@ def _blocks(lines: list[str]) -> list[tuple[int | None, list[str]]]:
 
 
 def show_in_lines(value: Any) -> None:
-    """Show the signature and the docstring of a function in lines, of a class those of its methods too.
+    """Show the signature and the docstring of a function in lines, for a class also those of its methods.
 
     >>> from collections.abc import Callable
     >>> def function(first: Callable[[int], str] | None = None, *, second: str = "none", third: float = 0.5): ...
@@ -142,7 +142,7 @@ def show_in_lines(value: Any) -> None:
 
 
 def _name_others(cls: type[Any], base: type[Any]) -> None:
-    """Say behind the arguments of a class where `help` has those of its base."""
+    """Add to the arguments of a class where `help` shows those of its base."""
     first, raises, rest = inspect.cleandoc(cls.__doc__ or "").partition("\n\nRaises:")
     if raises and "Other arguments:" not in first:
         of = f"those of every {base.__name__.lower()}, see\nhelp({base.__module__}.{base.__name__})."
@@ -150,14 +150,14 @@ def _name_others(cls: type[Any], base: type[Any]) -> None:
 
 
 def _line_text(value: Any, indent: int) -> None:
-    """Give a docstring lines that are as wide as a terminal, less the indent that `help` adds."""
+    """Give a docstring lines of the width of a terminal, without the indent that `help` adds."""
     text = value.__doc__
     if isinstance(text, str) and max(map(len, text.splitlines()), default=0) > _COLUMNS - indent:
         value.__doc__ = in_columns(inspect.cleandoc(text), _COLUMNS - indent)
 
 
 def _line(function: FunctionType, indent: int = 0) -> None:
-    """Give a function a `Lined` signature, if its own is long; checks of arguments are not part of it."""
+    """Give a function a `Lined` signature if its own is long, without checks of arguments."""
     if "__signature__" not in vars(function):
         for name, kind in function.__annotations__.items() if function.__name__ == "__init__" else ():
             if not isinstance(kind, (type, str)):
@@ -169,7 +169,7 @@ def _line(function: FunctionType, indent: int = 0) -> None:
 
 
 def explain_calls(value: Any) -> Any:
-    """A function, or a class, of which a call with wrong arguments says which there are.
+    """Return a function or class that raises an error with the possible arguments when called with wrong ones.
 
     >>> def function(radius: float, *, side: str = "inside"): ...
     >>> explain_calls(function)(1.0, sdie="outside")
@@ -190,7 +190,7 @@ def explain_calls(value: Any) -> Any:
 
 
 def explain_methods(kind: type[_Kind]) -> type[_Kind]:
-    """A class; its public methods say which arguments they have when they are called with others."""
+    """Return a class with public methods that name their arguments when they are called with others."""
     for name, method in list(vars(kind).items()):
         if isinstance(method, FunctionType) and not name.startswith("_"):
             setattr(kind, name, _explained(method, method))
@@ -211,7 +211,7 @@ def _explained(function: FunctionType, public: Any) -> Any:
 
 
 def _with_arguments(message: str, public: Any) -> str:
-    """An error of Python about the arguments of a call, with those that there are, and the nearest."""
+    """Return a Python error about the arguments of a call with the possible arguments, and the most similar."""
     parameters = inspect.signature(public).parameters.values()
     given = [one.name for one in parameters if one.kind != one.VAR_KEYWORD and not one.name.startswith("_")]
     known = [name for name in given if name != "self"]

@@ -1,4 +1,4 @@
-"""The arrays of the particles at a frame, for readers: copies, made when they are first read."""
+"""The read-only arrays of the particles at a frame: copies that are made when they are first read."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,19 +9,19 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from .checks import Vector
 
-# Name -> array; None where a run has none.
+# Name -> array; None if a run does not have it.
 Read = Callable[[str], Any]
 
 
 class Snapshot:
-    """The arrays of particles at a frame by their names, each copied when it is first read, and never to be written.
+    """The arrays of particles at a frame by their names, each copied when it is first read, and never written.
 
     Args:
-        read: gives "position", "velocity", "mass", "impacts", and "image", "escape_time", "absorbed_time",
+        read: returns "position", "velocity", "mass", "impacts", and "image", "escape_time", "absorbed_time",
             "radius", "spin" and "collisions" or None for each.
         gravity: [m/s^2], or None.
         period: of the scene [m], or None.
-        there: how many of them, the first ones, are there, or a mask of those (N,); None for all.
+        there: the number of particles that are present, the first ones, or their mask (N,); None for all.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class Snapshot:
         self._known: dict[str, Any] = {}
 
     def read(self, name: str, frame: str) -> Any:
-        """An array of the particles of a frame, which a sentence calls so.
+        """Return an array of the particles of a frame; `frame` is its name in a message.
 
         Raises:
             SceneError: the frame is over.
@@ -70,9 +70,9 @@ class Snapshot:
         return np.asarray(mass * energy)
 
     def end(self) -> None:
-        """Nothing more is read: the next frame begins."""
+        """End reading: the next frame begins."""
         self._read = None
 
 
-# That of a frame that has no arrays.
+# The snapshot of a frame without arrays.
 NOTHING = Snapshot(None)

@@ -4,7 +4,7 @@ from enum import IntEnum
 
 
 class Status(IntEnum):
-    """Codes that kernels return; the worst of a run becomes one sentence."""
+    """Codes that kernels return; the worst one of a run becomes a message."""
 
     DONE = 0
     INTERRUPTED = 1
@@ -23,7 +23,7 @@ class Status(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """The meaning, for the user."""
+        """Return the meaning, for the user."""
         return _SENTENCES[self]
 
 
@@ -40,10 +40,10 @@ _SENTENCES = {
     Status.LEASE_ENDED: "walls that react have moved so far that all particles are predicted again",
     Status.LOG_FULL: "the log of impacts needs an empty part",
     Status.SENT_WRONG: "one of the laws of a wall gave it no velocity, or one into the wall, or out of the plane",
-    Status.WAITS: "one of the laws of a wall lets it wait there, though it let none wait in its trials before the run; "
-    "let it do so more often, or let it leave at once",
-    Status.TOO_DEEP: "it has passed the middle of what it meets, or a ball the surface: the contact is too soft for "
-    "the speed; use a larger penalty, or a smaller speed",
+    Status.WAITS: "one of the laws of a wall lets it wait there, although no particle waited in its trials before the "
+    "run; let particles wait more often, or leave at once",
+    Status.TOO_DEEP: "it has passed the middle of a solid, or its centre has passed a surface: the contact is too soft "
+    "for the speed; use a larger penalty, or a smaller speed",
     Status.TIMELESS: "it goes from step to step, or from wall to wall, and no time passes; start it elsewhere, or end "
     "the run before",
 }

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from . import checks
 
-# What `Annotated` holds behind the type of a field: (name, value) -> the value in its final form, or a `SceneError`.
+# The check in `Annotated`, after the type of a field: (name, value) -> the final value, or a `SceneError`.
 Check = Callable[[str, Any], Any]
 
 Number = Annotated[float, checks.number]
@@ -27,15 +27,15 @@ Point = Annotated[checks.Vector, checks.vector]
 
 
 def choice(*choices: str) -> Check:
-    """The check of a text that is one of `choices`."""
+    """Return the check of a text that must be one of `choices`."""
     return functools.partial(checks.one_of, choices=choices)
 
 
 class Validated:
     """A base of dataclasses: a field of an `Annotated` type gets the value that its check returns.
 
-    None stands where the type allows it and is not checked. A subclass checks in its `__post_init__`, after that of its
-    base, what concerns several fields.
+    None is not checked where the type allows it. A subclass checks conditions on several fields in its
+    `__post_init__`, after that of its base.
 
     >>> from dataclasses import dataclass
     >>> @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Validated:
 
 @functools.cache
 def _declared(cls: Any) -> tuple[tuple[str, Check, bool], ...]:
-    """The name of each field that has a check, the check, and whether None takes its place."""
+    """Return for each field with a check its name, the check, and whether None is allowed."""
     kinds = {name: (one.type, *getattr(one.type, "__args__", ())) for name, one in cls.__dataclass_fields__.items()}
     found = [
         (name, check, type(None) in either)
@@ -71,7 +71,7 @@ def _declared(cls: Any) -> tuple[tuple[str, Check, bool], ...]:
 
 
 def bare(kind: Any) -> Any:
-    """An annotation without its checks.
+    """Return an annotation without its checks.
 
     >>> bare(Length), bare(Length | None)
     (<class 'float'>, float | None)
@@ -85,5 +85,5 @@ def bare(kind: Any) -> Any:
 
 
 def is_left_out(described: Any, field: dataclasses.Field[Any]) -> bool:
-    """Whether a field is at the default that it has in files that are older than it: then files leave it out."""
+    """Whether a field has the default of older files that do not have it: then files omit it."""
     return bool(field.metadata.get("younger")) and getattr(described, field.name) == field.default

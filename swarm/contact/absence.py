@@ -1,8 +1,8 @@
-"""Where walls are absent, for points at a wall: in a lasting contact, and at the end of a flight.
+"""The absence of walls, for points at a wall: in a lasting contact, and at the end of a flight.
 
 A wall `stands` at a place on it unless it has ended there, beyond its patch or in another room, or is open: each is an
-`Absence`. Where a wall has ended, particles that slide go on on the wall after it, or fly. At an opening they escape,
-or come into the room behind it.
+`Absence`. Where a wall has ended, sliding particles go on along the wall after it, or fly. At an opening they escape,
+or enter the room behind it.
 """
 
 import math
@@ -23,9 +23,9 @@ from .events import TOUCH
 from .path import BEFORE, PLACES, at_part, first_true, members_of, reach_of
 from .reflection import relative, wall_velocity
 
-# Steps of the search for the least distance to an opening between three places of a step.
+# Steps of the search for the least distance to an opening, between three places of a step.
 _THIRDS = 80
-# The part of a velocity, or of gravity, that does not press on a wall.
+# The fraction of a velocity, or of gravity, that does not press on a wall.
 _PRESSED = 1e-9
 
 
@@ -33,7 +33,7 @@ _PRESSED = 1e-9
 
 
 def ends_of(walls):
-    """The ways in which walls end: a constant number for the compiler, 0 where none does."""
+    """Return the ways in which walls end: a constant number for the compiler, 0 if no wall ends."""
     patches = tuple((first, field.members) for first, field in walls.fields())
     return (
         *(Patches(first, members) for first, members in patches if isinstance(members_of(members), Patched)),
@@ -42,12 +42,12 @@ def ends_of(walls):
 
 
 def lets_through(openings, walls, wall, r, near):
-    """Whether an opening takes a wall away at a place on it, or nearer to it than `near`."""
+    """Whether an opening removes a wall at a place on it, or nearer to it than `near`."""
     return is_absent(openings, walls, wall, r, near, OPEN)
 
 
 def stands(openings, walls, wall, r, near):
-    """Whether a wall has not ended at a place on it, and no opening lets through there."""
+    """Whether a wall has not ended at a place on it, and is not open there."""
     ended = is_absent(ends_of(walls), walls, wall, r, near, BEYOND)
     return not ended and not lets_through(openings, walls, wall, r, near)
 
@@ -62,7 +62,7 @@ def lets_out(openings, rules, walls, wall, r, near):
 
 @outlined
 def _is_covered(openings, rules, walls, wall, r, near):
-    """Whether a closed wall that faces the same way is at the same place: both hold what slides on one."""
+    """Whether a closed wall with the same orientation is at the same place: both hold a particle that slides on one."""
     number, touch = walls.numbers_near(r), TOUCH * rules.size + near
     for i in range(number.size):
         here = face_alike(walls, wall, number[i], r) and abs(walls.distance(number[i], r)) <= touch
@@ -73,7 +73,7 @@ def _is_covered(openings, rules, walls, wall, r, near):
 
 @outlined
 def hit_wall(openings, rules, walls, motion, wall, near):
-    """The wall that a particle (r, v) hits at this one: where this is open, the closed wall that it reaches first."""
+    """Return the wall that a particle (r, v) hits at this one: if it is open, the closed wall that is reached first."""
     r, v = motion
     if not lets_through(openings, walls, wall, r, near):
         return wall
@@ -93,7 +93,7 @@ def hit_wall(openings, rules, walls, motion, wall, near):
 
 @outlined
 def open_wall_at(openings, rules, walls, gravity, motion, near):
-    """A wall at the place of a particle (r, v) that lets it out there, or -1; into another room if it is pressed."""
+    """Return a wall at the place of a particle (r, v) that lets it out, or -1; into a room only if pressed there."""
     r, v = motion
     number, touch, ways = walls.numbers_near(r), TOUCH * rules.size, ends_of(walls)
     for i in range(number.size):
@@ -106,30 +106,30 @@ def open_wall_at(openings, rules, walls, gravity, motion, near):
 
 
 def _is_pressed(walls, gravity, wall, r, v):
-    """Whether a particle that is at a wall moves into it, or is pulled into it."""
+    """Whether a particle at a wall moves into it, or is pulled into it."""
     n, pull = walls.unit_normal(wall, r), accelerated(gravity, ZERO, 1.0)
     return dot(n, v) > _PRESSED * norm(v) or dot(n, pull) > _PRESSED * norm(pull)
 
 
 def closeness(walls):
-    """A distance from an opening that counts as 0 for a flight: round-off of where rooms meet, 0 without unions."""
+    """The distance from an opening that counts as 0 for a flight: the round-off where rooms meet, 0 without unions."""
     return 2.0 * depth_behind(walls) if len(walls.unions) > 0 else 0.0
 
 
 def through(walls, gravity, wall, motion):
-    """A particle (r, v) that is at an open wall, on its other side, with the same energy."""
+    """Return a particle (r, v) at an open wall on the other side of it, with the same energy."""
     r, v = motion
     there, speed2 = other_side(walls, wall, r), square(v)
     gained = dot(accelerated(gravity, ZERO, 1.0), there - r)
     return there, v + (select(speed2 > abs(gained), gained / select(speed2 > 0.0, speed2, 1.0), 0.0)) * v
 
 
-# --- Of the walls that hold a particle -------------------------------------------------------------------
+# --- For the walls that hold a particle -----------------------------------------------------------------
 
 
 @outlined
 def open_wall_of(openings, rules, walls, active, r, near):
-    """The wall of those that hold a particle that lets it out at its place, or -1."""
+    """Return the wall, of those that hold a particle, that lets it out at its place, or -1."""
     if lets_out(openings, rules, walls, active.first, r, near):
         return active.first
     return active.second if lets_out(openings, rules, walls, active.second, r, near) else -1.0
@@ -137,7 +137,7 @@ def open_wall_of(openings, rules, walls, active, r, near):
 
 @outlined
 def ended_wall(walls, active, r, near):
-    """The wall of those that hold a particle that has ended where it is, or -1."""
+    """Return the wall, of those that hold a particle, that has ended at its place, or -1."""
     if is_absent(ends_of(walls), walls, active.first, r, near, FLIES):
         return active.first
     return active.second if is_absent(ends_of(walls), walls, active.second, r, near, FLIES) else -1.0
@@ -145,7 +145,7 @@ def ended_wall(walls, active, r, near):
 
 @outlined
 def wall_after(walls, wall, r, near):
-    """The wall on which particles that slide on this one go on where it ends, or -1: they fly."""
+    """Return the wall on which sliding particles go on where this one ends, or -1 if they fly."""
     found = -1.0
     for way in ends_of(walls):
         if way.is_of(wall):
@@ -157,7 +157,7 @@ def wall_after(walls, wall, r, near):
 
 
 def may_be_absent(openings, walls, active, path, near):
-    """Of the walls that hold the particle: (whether one has ended at the end of a step, whether one may be open)."""
+    """Whether (a wall that holds the particle has ended at the end of a step, one of them may be open in the step)."""
     ended, found, ways = False, False, ends_of(walls)
     for wall in active:
         ended = ended | is_absent(ways, walls, wall, path.r1, near, BEYOND)
@@ -172,13 +172,13 @@ def may_be_absent(openings, walls, active, path, near):
 
 
 def _may_lead_on(walls, wall, path):
-    """Whether another room is behind a wall at some place of a step: a wall of its own, such as a floor, has none."""
+    """Whether another room is behind a wall at some place of a step; a wall without a room behind it has none."""
     middle = 0.5 * (path.r0 + path.r1)
     return leads_on(walls, wall, path.r0) | leads_on(walls, wall, middle) | leads_on(walls, wall, path.r1)
 
 
 def part_until_open(openings, rules, walls, active, path, near):
-    """The part of a step after which a wall that holds the particle lets it out; infinite where none does."""
+    """Return the part of a step after which a wall that holds the particle lets it out, or infinity."""
     if openings is None:
         return math.inf
     first = _part_until_open(openings, rules, walls, active.first, path, near)
@@ -187,7 +187,7 @@ def part_until_open(openings, rules, walls, active, path, near):
 
 @outlined
 def part_until_end(walls, active, path, near, remaining):
-    """The part of a step after which a wall that holds the particle has ended; infinite where none has."""
+    """Return the part of a step after which a wall that holds the particle has ended, or infinity."""
     return first_true(_ends_at, (walls, active, path, near, remaining), BEFORE, BEYOND, CUT)
 
 
@@ -199,7 +199,7 @@ def _ends_at(walls, active, path, near, remaining, depth, part):
 
 @outlined
 def _part_until_open(openings, rules, walls, wall, path, near):
-    """`part_until_open` of one wall. If its opening does not let the particle out, the rest of the step is asked."""
+    """`part_until_open` for one wall. If the opening does not let the particle out, search the rest of the step."""
     low = math.inf
     for opening in openings:
         if opening.is_of(wall):
@@ -219,7 +219,7 @@ def _lets_out_at(openings, rules, walls, wall, path, near, part):
 
 
 def _over_bodies(volume, path, near, found, ask, given):
-    """`found` after ask(found, volume, path, given), of a field for each body that a step may come near to."""
+    """Return ask(found, volume, path, given); of a field repeat it for each body that a step may come near to."""
     if isinstance(volume, Field):
         return _over_members(volume.members, path, near, found, ask, given)
     return ask(found, volume, path, given)
@@ -240,7 +240,7 @@ def _may_enter(found, volume, path, reach):
 
 
 def _way_into(first, volume, path, near):
-    """The sooner of a part of a step and of that after which the step is in a volume."""
+    """Return the smaller of a part of a step and the part after which the step is in a volume."""
     return min(_way_in(volume, path, near), first)
 
 
@@ -252,7 +252,7 @@ def _way_in(volume, path, near):
 
 
 def _nearest(volume, path, near, low, part, high):
-    """The part of a step at which it is nearest to a volume, between two others, if it may be in it there."""
+    """Return the part of a step nearest to a volume, between `low` and `high`, if it may be in the volume there."""
     here = outside(volume, at_part(path, part))
     if here < -near or not here <= reach_of(path) / PLACES:
         return part

@@ -1,9 +1,9 @@
 """One step against all walls of a scene at once: Gauss-Seidel over the walls that hold the particle.
 
-Each wall is solved with the reactions of the others held, until the end of the step no longer moves. Every equation is
-that of a soft wall: its reaction follows from the gap. Rigid walls, projection.py, take none of these sweeps: nearly
-opposite ones, as in a cusp, would take next to nothing one after the other, so that all sets of up to three walls are
-looked at for the one that carries. Uzawa's loop, uzawa.py, is around these sweeps, with one multiplier a wall.
+Each wall is solved with the reactions of the others fixed, until the end of the step no longer moves. Every equation
+is that of a soft wall: its reaction follows from the gap. Rigid walls, projection.py, do not use these sweeps: nearly
+opposite walls, as in a cusp, would gain next to nothing one after the other, so all sets of up to three walls are
+tested for one that carries. Uzawa's loop, uzawa.py, is around these sweeps, with one multiplier for each wall.
 """
 
 from ..kernel.jit import outlined
@@ -19,7 +19,7 @@ _SWEEPS = 500
 
 
 class CornerEnd(Record):
-    """The end r1 of a step that the walls hold back, and whether every wall was solved."""
+    """The end r1 of a step against walls, and whether every wall was solved."""
 
     r: Vec
     solved: bool
@@ -27,9 +27,9 @@ class CornerEnd(Record):
 
 @outlined
 def hold(form, law, multipliers, walls, step, reactions):
-    """The end of one step against all walls.
+    """Make one step against all walls; return its `CornerEnd`.
 
-    `multipliers` has one entry for each wall; None: no multipliers. `reactions` (walls, 4) is set to
+    `multipliers` has one entry for each wall, or is None. `reactions` (walls, 4) is set to
     c D (alpha Phi_mean + lambda), Phi1.
     """
     reactions[:] = 0.0
@@ -38,12 +38,12 @@ def hold(form, law, multipliers, walls, step, reactions):
         before = r
         solved = _sweep(walls, form, law, multipliers, step, reactions)
         r = step.r + (step.p - total(reactions))
-        # In an acute edge the reactions are larger than what is left of them, and so is their round-off.
+        # In an acute edge the reactions are larger than their sum, and so is their round-off.
         size, moved = max(largest(r), largest(step.p), _size_of(reactions)), largest(r - before)
         if solved and (reactions.shape[0] == 1 or (i > 0 and moved <= 4.0 * EPSILON * size)):
             return CornerEnd(r, True)
         if i > 0 and moved == 0.0:
-            # A wall that is not solved: sweeps from where they began say the same.
+            # A wall that is not solved: sweeps that return to their start repeat the result.
             return CornerEnd(r, False)
     return CornerEnd(r, False)
 
@@ -71,7 +71,7 @@ def _size_of(reactions):
 
 @outlined
 def _sweep(walls, form, law, multipliers, step, reactions):
-    """Solve every wall once; whether all were solved."""
+    """Solve every wall once; return whether all were solved."""
     solved = True
     for k, wall in enumerate(walls.each):
         reactions[k] = 0.0
@@ -93,7 +93,7 @@ def add_reaction_impulses(reactions, h, impulse, lane):
 
 @outlined
 def add_reaction_works(moving, walls, factor, reactions, ends, impulse, lane):
-    """Add the work per mass of each wall in a step, `factor` reaction.swept(*ends), to its row of `impulse`; the sum.
+    """Add the work per mass of each wall in a step, `factor` reaction.swept(*ends), to its row of `impulse`; return it.
 
     The rows of work follow the rows of impulses; without moving walls `impulse` has no rows of work.
     """
@@ -109,7 +109,7 @@ def add_reaction_works(moving, walls, factor, reactions, ends, impulse, lane):
 
 @outlined
 def constraints(walls, law, r, into):
-    """Phi of every wall at a point into `into`; 0 for gaps that are round-off."""
+    """Write Phi of every wall at a point to `into`; 0 for gaps that are round-off."""
     for k, wall in enumerate(walls.each):
         start = contact_impulse.start_of(0.0, wall, r)
         into[k] = law.constraint(start.gap)

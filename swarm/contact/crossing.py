@@ -1,4 +1,4 @@
-"""Whether a step of a particle that slides goes into a wall that does not hold it, and where it is cut then."""
+"""Whether a step of a sliding particle goes into a wall that does not hold it, and where the step is then cut."""
 
 import math
 from typing import Any
@@ -18,7 +18,7 @@ from ..surfaces.walls import Field
 from .path import StepPath, at_part, first_true, members_of, reach_of
 from .rooms import leaving
 
-# Of a speed, the part across a wall of what goes along it.
+# A speed across a wall up to this fraction of the speed is along the wall.
 _ALONG = 1e-9
 # Fraction of the size of a scene that counts as 0.
 _NEAR = 1e-13
@@ -27,7 +27,7 @@ _NEAR = 1e-13
 def meets(walls, ends, active, path, near):
     """Whether a step may go deeper than `near` into a wall that does not hold the particle.
 
-    `ends` are the walls at its end, which are others where they move.
+    `ends` are the walls at its end, which differ if they move.
     """
     found = False
     for rooms, rooms_then in zip(walls.joined(), ends.joined(), strict=True):
@@ -51,20 +51,20 @@ def _leaves_all(rooms, ends, active, path, near):
         for (number, wall, _gentle), (_number, end, _) in zip(room, then, strict=True):
             met = (_may_meet(wall, end, path, near) & (not active.has(number))) | met
             enters, holds = _is_entrance(wall, path, near) | enters, active.has(number) | holds
-        # A particle that comes to the face of a room that does not hold it has not entered the room.
+        # A particle at the face of a room that does not hold it has not entered the room.
         leaves = (met | (enters & (not holds))) & leaves
     return leaves
 
 
 def _is_entrance(wall, path, near):
-    """Whether a step begins at a wall of a room, and goes into that."""
+    """Whether a step begins at a wall of a room, and goes into the wall."""
     level, rise, scale = _level(wall, path.r0, path.v0)
     return (level > -near * scale) & (rise < -_ALONG * scale * norm(path.v0))
 
 
 @outlined
 def _meets_one(field, ends, number, active, path, near):
-    """`meets` of the bodies of a field that has so many walls before it."""
+    """`meets` for the bodies of a field that has `number` walls before it."""
     grid = members_of(field).grid
     # A step without a solution has no end.
     if not (square(path.r1) < math.inf and square(path.v1) < math.inf):
@@ -76,7 +76,7 @@ def _meets_one(field, ends, number, active, path, near):
 
 def _meets_body(found, m, field, ends, number, active, paths, near):
     m, (path, own) = float(m), paths
-    # In the frame of a field that moves: a particle that rests on a patch comes through no other, however fast they go.
+    # In the frame of a moving field: a particle at rest on a patch passes through no other, however fast they move.
     patches = members_of(field)
     if isinstance(patches, Patched) and not patches.is_ahead(m, own.r0, own.r1, reach_of(own) + near):
         return found
@@ -84,7 +84,7 @@ def _meets_body(found, m, field, ends, number, active, paths, near):
 
 
 def _is_held(field, number, m, active):
-    """Whether wall m of a field, which has so many walls before it, holds a particle, or goes on where one does."""
+    """Whether wall m of a field, with `number` walls before it, holds a particle, or continues a wall that does."""
     held = active.has(number + m)
     if isinstance(members_of(field), Patched):
         for one in active:
@@ -94,7 +94,7 @@ def _is_held(field, number, m, active):
 
 
 def own_path(field, ends, path):
-    """A step in the frame of a field, which is `ends` at its end."""
+    """Return a step in the frame of a field, which is `ends` at its end."""
     if not isinstance(field, Posed):
         return path
     r0, v0 = field.own_place(path.r0), field.own_velocity(path.r0, path.v0)
@@ -102,7 +102,7 @@ def own_path(field, ends, path):
 
 
 def block_of_path(grid, path, near):
-    """The cells that the control points of a step reach into."""
+    """Return the cells that the control points of a step reach."""
     third = path.h / 3.0
     a, b = path.r0 + third * path.v0, path.r1 - third * path.v1
     low, high = lowest(lowest(path.r0, a), lowest(b, path.r1)), highest(highest(path.r0, a), highest(b, path.r1))
@@ -128,25 +128,25 @@ def _level(surface, r, v):
 
 
 def _on_line(surface, end, r0, r1):
-    """Whether a straight way meets a wall with a level along it that is no polynomial: a cubic may miss it."""
+    """Whether a straight path meets a wall with a level along it that is no polynomial: a cubic may miss it."""
     if surface.is_quartic or surface.flat:
         return False
     time, _found = surface.straight_hit(end, r0, r1)
     return time < 1.0
 
 
-# --- Where it is cut -------------------------------------------------------------------------------------
+# --- Where the step is cut --------------------------------------------------------------------------------
 
 
 class Arrival(Record):
-    """The part of a step after which it meets a wall, infinite where it meets none, and that wall."""
+    """The part of a step after which it meets a wall, infinite without one, and this wall."""
 
     time: float
     wall: float
 
 
 def arrival(walls, active, path, near, remaining):
-    """The first wall that a step goes into, with so much of the frame left at its start [s]."""
+    """Return the first `Arrival` of a step at a wall, when `remaining` is left of the frame at its start [s]."""
     if isinstance(walls, Carried):
         return _arrival_later(walls, active, path, near, remaining)
     found = _out_of_unions(walls, active, path, near, remaining)
@@ -163,7 +163,7 @@ def arrival(walls, active, path, near, remaining):
 
 
 def _out_of_unions(walls, active, path, near, remaining):
-    """The first `Arrival` where a step leaves a union."""
+    """Return the first `Arrival` at which a step leaves a union."""
     found = Arrival(math.inf, -1.0)
     for rooms in walls.joined():
         spans = tuple((room[0][0], room[-1][0]) for room in rooms)
@@ -175,7 +175,7 @@ def _out_of_unions(walls, active, path, near, remaining):
 
 @outlined
 def _first_of(members, number, active, path, near, later):
-    """The first of a later `Arrival` and of those at the walls of a field, which has so many walls before it."""
+    """Return the first of a later `Arrival` and those at the walls of a field with `number` walls before it."""
     block = block_of_path(members.grid, path, near)
     return over_entries(members.grid, block, later, _sooner_body, members, number, active, path, near)
 
@@ -193,7 +193,7 @@ def _sooner_body(found, m, members, number, active, path, near):
 
 
 def _arrival_later(walls, active, path, near, remaining):
-    """`arrival` where some walls move."""
+    """`arrival` if some walls move."""
     later, before = _out_of_unions(walls, active, path, near, remaining), walls.count_in_fields()
     for i in range(len(walls.shared()) - len(walls.fields())):
         later = _sooner_at(later, i, walls, before, active, path, near, remaining)
@@ -216,7 +216,7 @@ def _arrival_among(field, ends, walls, number, active, path, near, remaining):
 
 
 def _sooner_at(found, m, walls, number, active, path, near, remaining):
-    """The sooner one of an arrival and that at wall m, which has so many before it."""
+    """Return the sooner of an arrival and that at wall m of a field with `number` walls before it."""
     wall = number + m
     if active.has(wall):
         return found
@@ -236,13 +236,13 @@ class _Still(Record):
         return dot(self.surface.unit_normal(path.r0), path.v0)
 
     def straight(self, path):
-        """The part after which the straight way is at the wall, for a step that is deep at none of its places."""
+        """Return the part at which the straight path is at the wall, for a step that is deep at none of its places."""
         time, found = self.surface.first_hit(path.r0, path.r1 - path.r0)
         return time if found and 0.0 < time < 1.0 else math.inf
 
 
 class _Moving(Record):
-    """A wall that may move, by its number, with so much of the frame left at the start of the step [s]."""
+    """A wall that may move, by its number; `remaining` is left of the frame at the start of the step [s]."""
 
     walls: Any
     wall: float
@@ -262,7 +262,7 @@ class _Moving(Record):
 
 @outlined
 def _deep_after(body, path, near):
-    """The part of a step after which it is deeper than `near` in a wall; 0 where it is there and goes in."""
+    """Return the part of a step after which it is deeper than `near` in a wall; 0 if it starts there and goes in."""
     if body.depth(path.r0, 0.0) >= -near and body.pace_into(path) > 0.0:
         return 0.0
     time = first_true(_is_deep, (body, path), 0.0, near, 0.0)
@@ -274,5 +274,5 @@ def _is_deep(body, path, depth, part):
 
 
 def near(rules, r):
-    """A distance that counts as 0: round-off."""
+    """Return a distance that counts as 0: round-off."""
     return _NEAR * rules.size + 8.0 * EPSILON * (abs(r.x) + abs(r.y) + abs(r.z))

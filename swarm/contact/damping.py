@@ -5,7 +5,7 @@ import math
 
 
 def damping_of(alpha: float, restitution: float) -> float | None:
-    """What times the root of the mass that moves is the damping C of a contact with this restitution, None for 1.
+    """Return the damping C of a contact with this restitution, over the root of the effective mass; None for 1.
 
     With y = Phi(g) and the time of Phi'(g) dt the equation of a contact, m g'' = -V'(g) - C dPhi/dt, is
         y'' + 2 z w y' + w^2 y = 0,   C = 2 z sqrt(alpha m),
@@ -18,12 +18,12 @@ def damping_of(alpha: float, restitution: float) -> float | None:
 
 @functools.lru_cache
 def _part_of_critical(restitution: float) -> float:
-    """z of a restitution below 1. A run asks for it of each wall, and twice."""
+    """Return z of a restitution below 1. A run calls it for each wall, and twice."""
     wanted = -math.log(restitution)
     low, high = 0.0, 1.0
     while _loss(high) < wanted:
         high *= 2.0
-    # Until there is no number between them.
+    # Ends when there is no number between them.
     while low < (middle := 0.5 * (low + high)) < high:
         if _loss(middle) < wanted:
             low = middle
@@ -33,7 +33,7 @@ def _part_of_critical(restitution: float) -> float:
 
 
 def _loss(z: float) -> float:
-    """-ln e of the part z of critical damping."""
+    """Return -ln e for the fraction z of critical damping."""
     if z == 1.0:
         return 2.0
     if z < 1.0:

@@ -4,7 +4,7 @@ The step m (v1 - v0) = h m G - h D (alpha Phi_mean + lambda) balances the energy
     mean value (6)  grad Phi at a point r_beta between r0 and r1; Phi must be C1 there, so the exponent is above 1.
     scalar (9)      (Phi1 - Phi0)/(|r1|^2 - |r0|^2) (r0 + r1): a sphere about the origin of r.
     composite       Phi[g0, g1] g[q0, q1] times a discrete gradient of the smooth inner function q. It is (9) for a
-                    sphere, holds for every surface, and lets Phi have a corner on it, so any exponent will do.
+                    sphere, holds for every surface, and lets Phi have a corner on it, so any exponent is possible.
 The discrete gradient of q is the surface's: grad q at the midpoint m for a quadric, else Gonzalez's
 grad q(m) + (q1 - q0 - grad q(m).d)/|d|^2 d, with d = r1 - r0.
 Source: García Orden & Ortega 2007, eqs. (6), (9); Gonzalez 1996.
@@ -20,18 +20,18 @@ from ..kernel.vector import ZERO, Vec, absolute, dot
 from . import impulse
 from .impulse import Step
 
-# Iterations of the mean-value form's two solves; halving alone would end sooner.
+# Iterations of the two solves of the mean-value form; halving alone would end sooner.
 _BETA_ITERATIONS = 200
 _FORCE_ITERATIONS = 200
-# Parts of a step in which a beta is looked for.
+# Parts of a step in which beta is searched.
 _PARTS = 16
-# How nearly a beta to its last digit must meet (6), relative to the push; and the first step of the solve after it.
+# The accuracy with which a beta to its last digit must meet (6), relative to the push; the first step of `balanced`.
 _NEARLY = 0.1
 _NUDGE = 1e-6
 
 
 def reaction_needs(gradient: str) -> tuple[Any, ...]:
-    """The needs of a step, of every wall, with that argument `gradient` of its method."""
+    """The functions of every wall that a step needs, for the argument `gradient` of its method."""
     return (*impulse.NEEDS, "resolve") if gradient == "mean-value" else impulse.NEEDS
 
 
@@ -65,21 +65,21 @@ def _constraint(law, surface, r):
 
 @outlined
 def identity_miss(law, surface, r0, r1, beta):
-    """grad Phi(r_beta).(r1 - r0) - (Phi1 - Phi0), r_beta = (1 - beta) r0 + beta r1; 0 where that is round-off."""
+    """grad Phi(r_beta).(r1 - r0) - (Phi1 - Phi0), r_beta = (1 - beta) r0 + beta r1; 0 if it is round-off."""
     d = r1 - r0
     gradient = constraint_gradient(law, surface, r0 + beta * d)
-    # The composite form has the difference without cancellation.
+    # The composite form gives the difference without cancellation.
     exact = composite(law, surface, r0, r1)
     miss = dot(gradient - exact, d)
     terms = dot(absolute(gradient) + absolute(exact), absolute(d))
     return 0.0 if abs(miss) <= 16.0 * EPSILON * terms else miss
 
 
-# --- A step that one wall holds back ---------------------------------------------------------------------
+# --- A step against one wall -----------------------------------------------------------------------------
 
 
 class Reaction(Record):
-    """The displacement c D (alpha Phi_mean + lambda) by which one wall holds a step back: r1 = r0 + p less it."""
+    """The displacement c D (alpha Phi_mean + lambda) by one wall: r1 = r0 + p minus the displacement."""
 
     vector: Vec
     constraint: float  # Phi1
@@ -88,9 +88,9 @@ class Reaction(Record):
 
 @outlined
 def reaction(form, law, multiplier, surface, step):
-    """The reaction of one wall in a step.
+    """Return the `Reaction` of one wall in a step.
 
-    `form` is Composite or MeanValue (or that of methods/implicit.py), `multiplier` a float or None.
+    `form` is Composite, MeanValue or the form of methods/implicit.py; `multiplier` is a float or None.
     """
     return form.reaction(law, multiplier, surface, step)
 
@@ -99,7 +99,7 @@ class Composite(NamedTuple):
     """The composite form."""
 
     def reaction(self, law, multiplier, surface, step):
-        """`Reaction` of a surface."""
+        """Return the `Reaction` of a surface."""
         equation = impulse.equation(law, multiplier, surface, step)
         kappa, solved = equation.careful()
         r1 = surface.push(step.r, step.p, kappa)
@@ -110,20 +110,20 @@ class MeanValue(NamedTuple):
     """The mean-value form: its nested solves are too long for lanes."""
 
     def reaction(self, law, multiplier, surface, step):
-        """`Reaction` of a surface."""
+        """Return the `Reaction` of a surface."""
         body, r0, p = surface.framed(step.r, step.p)
         return _MeanValueStep(law, multiplier, body, Step(r0, p, step.c)).reaction()
 
 
 def form_of(gradient: str) -> Composite | MeanValue:
-    """The form of a method's argument `gradient`."""
+    """Return the form for the argument `gradient` of a method."""
     return MeanValue() if gradient == "mean-value" else Composite()
 
 
 class _MeanValueStep(Record):
     """A step with the mean-value form.
 
-    Two nested solves: for each beta the strength of the push, and that beta for which (6) is a discrete gradient.
+    Two nested solves: the strength of the push for each beta, and the beta for which (6) is a discrete gradient.
     """
 
     law: Any
@@ -132,7 +132,7 @@ class _MeanValueStep(Record):
     step: Step
 
     def reaction(self):
-        """`Reaction` of the surface."""
+        """Return the `Reaction` of the surface."""
         low, high = 0.0, 0.0
         kappa, f_low = self.pushed(low)
         f_high = f_low
@@ -154,24 +154,24 @@ class _MeanValueStep(Record):
                     break
                 low, f_low, high, f_high = narrowed(low, f_low, high, f_high, beta, f)
         # Near the surface Phi' rises faster than beta has digits, and (6) is met only nearly. The strength that the
-        # identity requires along grad q(r_beta) meets it whatever beta is.
+        # identity requires along grad q(r_beta) meets it for any beta.
         r, change = self.balanced(beta, kappa)
         end = self.step.r + self.step.p - r
         return Reaction(r, _constraint(self.law, self.surface, end), found and change <= _NEARLY)
 
     @outlined
     def gradient_at(self, beta, kappa):
-        """r_beta = r0 + beta (p - kappa grad q(r_beta)), and grad q there."""
+        """Return r_beta = r0 + beta (p - kappa grad q(r_beta)), and grad q there."""
         r = self.surface.resolve(self.step.r + beta * self.step.p, beta * kappa)
         return r, self.surface.discrete_gradient(r, r)
 
     def force(self, first, last):
-        """alpha Phi_mean + lambda, from half of Phi at each end."""
+        """Return alpha Phi_mean + lambda, from half of Phi at each end."""
         return self.law.alpha * (first + last) + (0.0 if self.multiplier is None else self.multiplier)
 
     @outlined
     def balanced(self, beta, kappa):
-        """The reaction for this beta with exact energy, and by what part of itself kappa had to change."""
+        """Return the reaction for this beta with exact energy, and the relative change of kappa that this needs."""
         law, surface, step = self.law, self.surface, self.step
         k, before, f_before = kappa, kappa * (1.0 + _NUDGE), 0.0
         first = 0.5 * _constraint(law, surface, step.r)
@@ -198,7 +198,7 @@ class _MeanValueStep(Record):
 
     @outlined
     def pushed(self, beta):
-        """The kappa that solves the step with D along grad q(r_beta), and by how much (6) then misses its identity."""
+        """Return the kappa that solves the step with D along grad q(r_beta), and the miss of the identity (6)."""
         # F(kappa) = kappa - c (alpha Phi_mean + lambda) Phi'(g_beta) g'(q_beta); a solid pushes with kappa < 0.
         r, f = self.pushed_with(beta, 0.0)
         sign = -1.0 if f > 0.0 else 1.0
@@ -210,7 +210,7 @@ class _MeanValueStep(Record):
                 f_high = sign * f
                 if f_high > 0.0:
                     break
-                # Not past the push yet: the force grows along this line.
+                # `high` is not past the push yet: the force grows along this line.
                 low, f_low, high = high, f_high, 2.0 * high
             for _i in range(_FORCE_ITERATIONS):
                 kappa = illinois(low, f_low, high, f_high)
@@ -222,7 +222,7 @@ class _MeanValueStep(Record):
 
     @outlined
     def pushed_with(self, beta, kappa):
-        """The reaction kappa grad q(r_beta) and F(kappa)."""
+        """Return the reaction kappa grad q(r_beta) and F(kappa)."""
         law, surface, step = self.law, self.surface, self.step
         r_beta, d = self.gradient_at(beta, kappa)
         r = kappa * d
@@ -236,13 +236,13 @@ class _MeanValueStep(Record):
 
 
 def illinois(low, f_low, high, f_high):
-    """The next trial of regula falsi, the middle where that does not lie inside."""
+    """Return the next trial of regula falsi, or the middle if the trial is not inside."""
     trial = low - f_low * (high - low) / (f_high - f_low)
     return trial if low < trial < high else 0.5 * (low + high)
 
 
 def narrowed(low, f_low, high, f_high, trial, f):
-    """The half of the bracket that holds the root; the weight of an end that stays is halved (Illinois)."""
+    """Return the half of the bracket with the root; the weight of the end that stays is halved (Illinois)."""
     if f * f_high > 0.0:
         return low, 0.5 * f_low, trial, f
     return trial, f, high, 0.5 * f_high

@@ -1,6 +1,6 @@
-"""The energy that soft walls store, how well it is known, and their force, which has no discrete gradient.
+"""The energy that soft walls store, its uncertainty, and their force, which has no discrete gradient.
 
-The force at a point is -V'(g) grad g, what the implicit rules and Verlet take.
+The force at a point is -V'(g) grad g, which the implicit rules and Verlet use.
 """
 
 import math
@@ -12,25 +12,25 @@ from ..kernel.vector import ZERO, Vec, absolute, dot, norm, square, total
 from ..surfaces.presence.rooms import least_of
 from ..surfaces.walls import Field
 
-# The force needs these of every wall.
+# The force needs these functions of every wall.
 NEEDS = ("inner", "gap_of", "gap_slope", "discrete_gradient")
 
-# The part of |v|^2 up to which one Newton step of the square root restores it.
+# The fraction of |v|^2 up to which one Newton step of the square root restores it.
 _NEAR = 0.1
-# Units of round-off by which a contact that is solved may miss its energy.
+# Units of round-off that a solved contact may miss of its energy.
 _ROUND_OFF = 64.0 * 2.220446049250313e-16
 
 
 class Budget(Record):
-    """The measure of the energy of a step."""
+    """The numbers by which the energy of a step is measured."""
 
     over_mass: float  # 1/mass
-    energy: float  # of the particle, per mass: that at the start of the run, with the work of walls since
-    force: float  # that multipliers add to the springs, per mass
+    energy: float  # of the particle, per mass: the energy at the start of the run, plus the work of walls since then
+    force: float  # the force that multipliers add to the springs, per mass
 
 
 class Ends(Record):
-    """The two ends of a step of length h, and the velocity at the second."""
+    """The two ends of a step of length h, and the velocity at its end."""
 
     r0: Vec
     r1: Vec
@@ -39,7 +39,7 @@ class Ends(Record):
 
 
 def contact_energy(law, walls, over_mass, r):
-    """Energy per mass that one particle stores in the walls, by 1/mass; rigid walls (None) store none."""
+    """Return the energy per mass that one particle stores in the walls, from 1/mass; rigid walls (None) store none."""
     if law is None:
         return 0.0
     stored = _stored_in(law, tuple(wall for _number, wall in walls.shared()), r)
@@ -50,7 +50,7 @@ def contact_energy(law, walls, over_mass, r):
 
 
 def _stored_in(law, walls, r):
-    """The energy that a particle stores in some walls."""
+    """Return the energy that a particle stores in the given walls."""
     stored = 0.0
     for wall in reversed(walls):
         gap = wall.members.deepest_in_cell(r) if isinstance(wall, Field) else wall.gap_of(wall.inner(r))
@@ -59,9 +59,9 @@ def _stored_in(law, walls, r):
 
 
 def energy_uncertainty(walls, law, over_mass, r, s):
-    """The change of the stored energy per mass when each coordinate of r moves by that of s, to first order.
+    """Return the change of the stored energy per mass when each coordinate of r changes by that in s, to first order.
 
-    With s a few units of round-off this is how well the energy of a stiff wall can be known at all.
+    With s a few units of round-off this is the accuracy with which the energy of a stiff wall can be known.
     """
     found = 0.0
     for surface in reversed(walls.each):
@@ -73,12 +73,12 @@ def energy_uncertainty(walls, law, over_mass, r, s):
 
 
 def restoring_factor(law, walls, after, gravity, budget, ends):
-    """Factor of v after a contact step that restores the energy of the particle, and whether only round-off is missing.
+    """Return the factor of v after a contact step that restores the energy, and whether only round-off is missing.
 
     Each step conserves energy to round-off: V(g) feels the last bit of r, which in a stiff contact is 1e-13 of the
     energy, and over many contacts the errors add up (measured: 2e-10 after 10 000 steps at dt sqrt(alpha/m) = 100).
-    Where more than round-off is missing the factor is 1: that is an equation that was not solved, or a tolerance.
-    `walls` has the walls over the step, `after` those at its end.
+    If more than round-off is missing the factor is 1: then the equation was not solved, or ended at a tolerance.
+    `walls` are the walls over the step, `after` those at its end.
     """
     r0, r1, v, h = ends
     speed2 = square(v)
@@ -92,7 +92,7 @@ def restoring_factor(law, walls, after, gravity, budget, ends):
     balanced = abs(missing) <= _ROUND_OFF * uncertainty
     moving = balanced & (speed2 > 0.0)
     part = select(moving, missing / select(moving, speed2, 1.0), 0.0)
-    # Of a particle that all but rests the speed is round-off of the energy: a Newton step would overshoot.
+    # The speed of a particle nearly at rest is round-off of the energy: a Newton step would overshoot.
     rest = math.sqrt(select(part > -1.0, 1.0 + part, 0.0))
     return select(abs(part) <= _NEAR, 1.0 + 0.5 * part, rest), balanced
 
@@ -101,16 +101,16 @@ def restoring_factor(law, walls, after, gravity, budget, ends):
 
 
 def strength(law, surface, q):
-    """V'(g) g'(q): the force is this times -grad q."""
+    """Return V'(g) g'(q): the force is this times -grad q."""
     g = surface.gap_of(q)
-    # The divided difference of V for equal gaps.
+    # The divided difference of V for equal gaps
     push, _stiffness = law.energy_slope(g, g)
     slope, _curvature = surface.gap_slope(q, q)
     return select(g > 0.0, push * slope, 0.0)
 
 
 def walls_force(walls, law, r):
-    """The force of all walls [N]."""
+    """Return the force of all walls [N]."""
     found = ZERO
     for wall in reversed(walls.each):
         found = _added(found, wall, law, r)
@@ -118,10 +118,10 @@ def walls_force(walls, law, r):
 
 
 def _added(others, surface, law, r):
-    """A force with that of one more wall."""
+    """Add the force of one more wall to a force; return the sum."""
     f = strength(law, surface, surface.inner(r))
     d = surface.discrete_gradient(r, r)
-    # A select and no product: off the wall grad q may be infinite.
+    # A select instead of a product: off the wall grad q may be infinite.
     return select(f != 0.0, others - f * d, others)
 
 
@@ -135,7 +135,7 @@ def add_impulses(walls, law, factor, r, impulse, lane):
 
 
 def work(moving, walls, now, law, r):
-    """The sum of force.displacement of all walls: `walls` has them over the step, `now` when the particle is at r."""
+    """Return the sum of force.displacement of all walls: `walls` over the step, `now` when the particle is at r."""
     found = 0.0
     if moving is None:
         return found
@@ -146,7 +146,7 @@ def work(moving, walls, now, law, r):
 
 @outlined
 def add_works(moving, walls, now, law, factor, r, impulse, lane):
-    """Add `factor` times force.displacement of each wall to its row of work in `impulse`: their sum, as `work`."""
+    """Add `factor` times force.displacement of each wall to its row of work in `impulse`; return the sum, as `work`."""
     found = 0.0
     if moving is None:
         return found

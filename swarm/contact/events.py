@@ -15,27 +15,27 @@ from .laws import NONE
 from .projection import ALLOWED
 from .reflection import energy_of, exact, relative, wall_velocity
 
-# What a particle does: it flies, slides along one wall or an edge, has arrived, or is at a wall where that is to be
-# decided; or it is left to `careful`.
+# The phases of a particle: it flies, slides along one wall or an edge, has arrived, or is at a wall where its phase is
+# to be decided; or it is left to `careful`.
 PHASES = 6
 FLYING, HELD, EDGE, ARRIVED, EVENT, CAREFUL = range(PHASES)
-# A particle leaves a wall slower than this part of its own speed: its hops are 1e-4 of a crossing long.
+# A particle that leaves a wall slower than this fraction of its own speed slides: its hops are 1e-4 of a crossing long.
 GRAZING = 5e-5
-# Of a speed, the impulse that is no impact: round-off of a particle at its wall.
+# An impulse below this fraction of the speed is round-off of a particle at its wall, and no impact.
 NO_IMPACT = 1e-12
 # A speed across the walls up to this fraction of a particle's own speed counts as 0: its square is round-off of the
 # energy.
 _NO_HOP = 1e-7
 # Fractions of an acceleration and of a time that count as 0.
 _PRESSED, _INSTANT = 1e-12, 1e-9
-# Walls nearer to each other's tangent plane than this (as a sine) have no edge to slide along.
+# Walls nearer to each other's tangent plane than this sine have no edge to slide along.
 _SHARPEST = 1e-7
-# Walls within this part of the scene's size hold a particle together.
+# Walls within this fraction of the size of the scene hold a particle together.
 TOUCH = 1e-10
 
 
 class Particle(Record):
-    """A particle in contact: its energy is twice that per mass, and scale2 is the square of its own speed."""
+    """A particle in contact: `twice` is twice the energy per mass, and scale2 is the square of its own speed."""
 
     r: Vec
     v: Vec
@@ -47,7 +47,7 @@ class Particle(Record):
 class Next(Record):
     """The state of a particle after an event: phase, velocity along the walls, speed across them, energy, walls.
 
-    `impulse` is that of the wall, `wait` how long the hops last that are left out.
+    `impulse` is the impulse of the wall, `wait` the time of the hops that are left out.
     """
 
     phase: int
@@ -61,14 +61,14 @@ class Next(Record):
 
 
 def own_speed2(p):
-    """The square of a particle's own speed: the larger one of its scale and of its motion."""
+    """Return the square of a particle's own speed: the larger of its scale and its motion."""
     return max(p.scale2, square(p.v))
 
 
 def weightless(rules, gravity, p):
-    """An acceleration that counts as 0 for this particle: round-off of gravity, and of the pull of walls that bend.
+    """Return an acceleration that counts as 0 for this particle: round-off of gravity, and of the pull of bent walls.
 
-    The size of the scene is no measure of it: that of a floor, or of a slot between two planes, is where these are.
+    The size does not enter: for a floor, or a slot between two planes, it depends on their places, not on the pull.
     """
     return _PRESSED * (norm(accelerated(gravity, ZERO, 1.0)) + own_speed2(p) / rules.bend)
 
@@ -77,7 +77,7 @@ def _loses(rules, wall):
     return 1.0 - rules.laws.restitution_of(wall) > 0.0
 
 
-# Each once in a kernel, and not wherever it is asked for: half of the time to compile.
+# Each is compiled once in a kernel, and not at each call: half of the time to compile.
 
 
 @outlined
@@ -100,7 +100,7 @@ def _bounce(rules, walls, gravity, wall, p):
 
 @outlined
 def enter(rules, walls, gravity, wall, p):
-    """`Next` of a particle that leaves this wall so slowly that it is back at once."""
+    """Return `Next` of a particle that leaves this wall so slowly that it is back at once."""
     n, u = _normal(walls, wall, p.r), wall_velocity(rules.laws.moving, walls, wall, p.r)
     v, twice, impulse = p.v, p.twice, 0.0
     if dot(relative(u, v), n) > 0.0:
@@ -135,33 +135,33 @@ def enter(rules, walls, gravity, wall, p):
     if not _loses(rules, wall):
         keep = _kept(away, p)
         return Next(HELD, along, keep, _twice_held(u, v, twice, along, keep), wall, impulse=impulse)
-    # Chattering: hops of hop, e hop, e^2 hop, ... last hop/(1 - e) together. In that time the wall gives `away` less to
-    # the particle than to one that slides, which the caller books, and friction as much less.
+    # Chattering: hops of hop, e hop, e^2 hop, ... take hop/(1 - e) together. In this time the wall gives the particle
+    # less impulse than one that slides by `away`, which the caller books, and friction gives less in proportion.
     slip = relative(u, along)
     e, speed = rules.laws.restitution_of(wall), norm(slip)
     spared = rules.laws.friction_of(wall) * away
-    # `away` may be below 0 by round-off, and what friction has stopped has no direction.
+    # `away` may be below 0 by round-off, and a particle that friction has stopped has no direction.
     faster = along + (spared / speed) * slip if speed > abs(spared) else along
     twice += square(faster) - square(along) - away * away if u is None else square(faster) - square(v)
     return Next(HELD, faster, 0.0, twice, wall, -1.0, impulse, hop / (1.0 - e))
 
 
 def _kept(across, p):
-    """The speed across its walls that a particle keeps while it slides."""
+    """Return the speed across its walls that a particle keeps while it slides."""
     return across if across > _NO_HOP * math.sqrt(own_speed2(p)) else 0.0
 
 
 def _twice_held(drift, v, twice, along, keep):
-    """Twice the energy per mass of a particle that keeps a speed across its walls instead of all of v.
+    """Return twice the energy per mass of a particle that keeps a speed across its walls instead of all of v.
 
-    In the frame of walls that move that is the energy it had: the rest is their work.
+    In the frame of moving walls it is the energy before: the rest is the work of the walls.
     """
     return twice if drift is None else twice + square(along) + keep * keep - square(v)
 
 
 @outlined
 def _on_edge(rules, walls, gravity, two, p):
-    """`Next` of a particle in an edge: it slides there if both walls press on it."""
+    """Return `Next` of a particle in an edge: it slides there if both walls press on it."""
     drift = hold.drift(rules.laws.moving, two, walls, p.r)
     taken = two.split_at(walls, drift, p.r, p.v)
     across2, kept2 = _across2(drift, p.v, taken)
@@ -180,7 +180,7 @@ def _on_edge(rules, walls, gravity, two, p):
 
 
 def _across2(drift, v, taken):
-    """The square that a velocity loses where its part across the walls is taken, and the square of that part."""
+    """Return the loss of |v|^2 without the velocity across the walls, and the square of this velocity."""
     if drift is not None:
         return square(v) - square(taken.along), square(v - taken.along)
     across2 = max(square(v) - square(taken.along), 0.0)
@@ -192,7 +192,7 @@ def _across2(drift, v, taken):
 
 @outlined
 def meet(rules, active, walls, gravity, wall, p):
-    """`Next` of a sliding particle at another wall."""
+    """Return `Next` of a sliding particle at another wall."""
     bounce = _bounce(rules, walls, gravity, wall, p)
     p, impulse = Particle(p.r, bounce.v, p.remaining, bounce.twice_energy, p.scale2), bounce.impulse
     moving = rules.laws.moving
@@ -216,7 +216,7 @@ def meet(rules, active, walls, gravity, wall, p):
 
 
 def _at_rest_there(active, rules, walls, gravity, wall, p):
-    """`Next` where a particle is too slow to leave the other wall: an edge, or that wall alone."""
+    """Return `Next` of a particle too slow to leave the other wall: in the edge, or on that wall alone."""
     if isinstance(active, Two):
         return Next(CAREFUL, p.v, 0.0, p.twice, wall)
     edge = _on_edge(rules, walls, gravity, Two(active.first, wall), p)
@@ -241,7 +241,7 @@ def _at_rest_there(active, rules, walls, gravity, wall, p):
 
 @outlined
 def careful(rules, walls, gravity, wall, p, impulse):
-    """A short step of a particle that several walls hold, as a `Landing`. Adds to impulse[:, 0]."""
+    """Make a short step of a particle that several walls hold; return its `Landing`, and add to impulse[:, 0]."""
     shortest = 2.0 * GRAZING * rules.size / math.sqrt(own_speed2(p))
     contacts = touching.ImpactSettings(None, rules.laws, shortest, TOUCH * rules.size)
     return touching.impact(
@@ -251,19 +251,19 @@ def careful(rules, walls, gravity, wall, p, impulse):
 
 @outlined
 def settles(rules, walls, gravity, p, active):
-    """Whether a slow particle is where several walls carry its weight together; `active` is of `are_carried`."""
+    """Whether a slow particle is where several walls carry its weight together; see `are_carried` for `active`."""
     slow = square(p.v) <= GRAZING * GRAZING * own_speed2(p)
     return slow and touching.are_carried(walls, gravity, p.r, p.v, TOUCH * rules.size, active)
 
 
 def rests(gravity, force):
-    """Whether a particle without speed stays where it is."""
+    """Whether a particle without speed stays at rest."""
     return norm(force.acceleration) <= ALLOWED * norm(accelerated(gravity, ZERO, 1.0))
 
 
 @outlined
 def off_the_wall(walls, wall, r, v, u):
-    """A velocity along a wall that lets the particle go, leaning away from it by more than round-off.
+    """Return a velocity along a wall that lets the particle go, with a part away from it of more than round-off.
 
     u is the velocity of the wall, or None.
     """

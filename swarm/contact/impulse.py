@@ -1,11 +1,11 @@
 """The impulse of one surface in one step with the composite discrete gradient: a scalar root.
 
-With h the step, m the mass, D(r0, r1) the discrete gradient of the inner function q, lambda the multiplier and
+With the step h, the mass m, the discrete gradient D(r0, r1) of the inner function q, the multiplier lambda and
     kappa = h^2/(2m) (V[g0, g1] + lambda Phi[g0, g1]) g[q0, q1]                              (K)
 the step is  r1 = r0 + p - kappa D,  v1 = v0 + h G - (2 kappa/h) D,  p = h v0 + h^2 G/2.
 The surface knows r1(kappa) in closed form (`push`), so (K) is one equation in one unknown. Without a multiplier its
 right side is a convex, decreasing function of kappa, so Newton's method from the left climbs to the smallest root.
-A multiplier is a float, or None where the method has none.
+A multiplier is a float, or None if the method has none.
 """
 
 import math
@@ -16,20 +16,20 @@ from ..kernel.limits import EPSILON
 from ..kernel.record import Record
 from ..kernel.vector import Vec
 
-# A Newton step that moves the gap by this part of itself is the last: its square is below round-off. Within the loop of
-# a multiplier its square need only be small, as the loop repairs the rest.
+# A Newton step that moves the gap by this fraction of itself is the last: its square is below round-off. Within the
+# loop of a multiplier its square need only be small, as the loop repairs the rest.
 _NEWTON_TOLERANCE = 1e-8
 _LOOP_TOLERANCE = 1e-2
-# Steps of the vectorised solve; what needs more is solved by `Equation.careful`.
+# Steps of the vectorised solve; lanes that need more are solved by `Equation.careful`.
 NEWTON_STEPS = 8
 _CAREFUL_ITERATIONS = 200
-# A push this near to its farthest has no root before it.
+# A push this near to the farthest one has no root before it.
 _NEAR = 1.0 - 1e-12
 # Doublings of a bracket: from the smallest number to the largest.
 _DOUBLINGS = 2100
-# A point is on the surface if a change of its coordinates by this part of themselves brings it there.
+# A point is on the surface if a change of its coordinates by this fraction of themselves brings it there.
 _ON_SURFACE = 8.0 * EPSILON
-# The equation and its energy need these of every wall; multipliers need `gap_scale` too.
+# The equation and its energy need these functions of every wall; multipliers also need `gap_scale`.
 NEEDS = (
     "inner", "gap_of", "gap_slope", "gradient", "discrete_gradient", "push",
     "rise", "farthest_push",
@@ -54,7 +54,7 @@ class StepStart(Record):
 
 
 def start_of(multiplier, surface, r):
-    """The `StepStart` of a step from r; only multipliers need a gap of round-off to count as 0."""
+    """Return the `StepStart` of a step from r; only multipliers need a gap of round-off to count as 0."""
     q0 = surface.inner(r)
     g0 = surface.gap_of(q0)
     if multiplier is None:
@@ -67,15 +67,15 @@ def start_of(multiplier, surface, r):
 class StepEnd(Record):
     """The end of a step at one surface."""
 
-    gap: float  # g1, from g1 - g0: more digits of a small g1 than r1 has
+    gap: float  # g1, computed from g1 - g0: more digits of a small g1 than r1 has
     rise: float  # q1 - q0
-    drise: float  # by kappa
+    drise: float  # derivative by kappa
     slope: float  # g[q0, q1]
-    dslope: float  # by q1
+    dslope: float  # derivative by q1
 
 
 class Residual(Record):
-    """F(kappa), the left side of (K) less its right side, and what it is made of."""
+    """F(kappa), the left side of (K) minus its right side, and its parts."""
 
     value: float
     slope: float  # F'(kappa)
@@ -85,7 +85,7 @@ class Residual(Record):
 
 
 class LoopRecord(Record):
-    """A step as the loop of a multiplier takes it."""
+    """The numbers of a step that the loop of a multiplier uses."""
 
     mean: float  # (Phi0 + Phi1)/2
     stored: float  # V1
@@ -96,7 +96,7 @@ class Newton(Record):
     """A Newton step of kappa, to be subtracted."""
 
     step: float
-    more: bool  # whether it was so large that another is needed
+    more: bool  # whether it is so large that another is needed
     record: LoopRecord
 
 
@@ -110,7 +110,7 @@ class Equation(Record):
     start: StepStart
 
     def end(self, kappa):
-        """The `StepEnd` of the step that is pushed with kappa."""
+        """Return the `StepEnd` of the step that is pushed with kappa."""
         start, surface, step = self.start, self.surface, self.step
         rise, drise = surface.rise(step.r, step.p, kappa)
         slope, dslope = surface.gap_slope(start.q, start.q + rise)
@@ -119,7 +119,7 @@ class Equation(Record):
         return StepEnd(select(abs(g1) <= start.round_off, 0.0, g1), rise, drise, slope, dslope)
 
     def residual(self, kappa):
-        """The `Residual` of kappa."""
+        """Return the `Residual` of kappa."""
         c, end = self.step.c, self.end(kappa)
         force, dforce = self.law.force(self.multiplier, self.start.gap, end.gap)
         dg1 = end.drise * (end.slope + end.dslope * end.rise)
@@ -128,10 +128,10 @@ class Equation(Record):
         return Residual(f, df, end.gap, dg1, end.slope)
 
     def newton(self, kappa):
-        """The `Newton` step of kappa.
+        """Return the `Newton` step of kappa.
 
-        What must be small is the step of the gap g1, relative to the gap of which the energy is the square: in a stiff
-        wall g1 is a small difference, and a kappa right to 1e-12 can leave an energy wrong by 1e-8.
+        The step of the gap g1 must be small, relative to the gap, as the energy is the square of the gap: in a stiff
+        wall g1 is a small difference, and a kappa correct to 1e-12 can leave an energy wrong by 1e-8.
         """
         start, f = self.start, self.residual(kappa)
         change = f.value / f.slope
@@ -143,9 +143,9 @@ class Equation(Record):
         return Newton(change, more, record)
 
     def record(self, g1, g, factor):
-        """The `LoopRecord` of the step that ends at gap g, from one that ended at g1; without a multiplier zeros.
+        """Return the `LoopRecord` of the step that ends at gap g, from one that ended at g1; zeros without multiplier.
 
-        dkappa/dlambda = c Phi[g0, g1] g[q0, q1]/F'(kappa); `factor` is that without Phi[g0, g1].
+        dkappa/dlambda = c Phi[g0, g1] g[q0, q1]/F'(kappa); `factor` is this without Phi[g0, g1].
         """
         if self.multiplier is None:
             return LoopRecord(0.0, 0.0, 0.0)
@@ -156,7 +156,7 @@ class Equation(Record):
 
     @outlined
     def careful(self):
-        """kappa by Newton's method inside a bracket, and whether it was found."""
+        """Return kappa by Newton's method inside a bracket, and whether it was found."""
         first = self.residual(0.0)
         if first.value == 0.0:
             return 0.0, True
@@ -176,7 +176,7 @@ class Equation(Record):
             else:
                 high = k
             trial = k - f / residual.slope
-            # Newton's steps that do not shrink have reached the noise of g1: halving the bracket ends.
+            # Newton steps that do not shrink have reached the noise of g1: halving the bracket ends.
             if not (low < trial < high and abs(trial - k) <= 0.5 * previous):
                 trial = 0.5 * (low + high)
             previous = abs(trial - k)
@@ -186,24 +186,24 @@ class Equation(Record):
         return sign * k, False
 
     def first_push(self, size, df):
-        """The first trial of the root, from |F(0)| and F'(0)."""
-        # The right side of (K) jumps where a multiplier no longer holds the particle; Newton's step is no guide to
-        # that. Without one it does not pass the root where the right side of (K) is convex. The value at 0 can be past
-        # the root of a falling g1: in a step across a long ellipsoid, where g1 falls and rises again, a bracket from
-        # there held the largest of three roots.
+        """Return the first trial of the root, from |F(0)| and F'(0)."""
+        # The right side of (K) jumps where a multiplier no longer holds the particle, and there Newton's step does not
+        # help. Without a multiplier it does not pass the root where the right side of (K) is convex. The value at 0 can
+        # be past the root of a falling g1: in a step across a long ellipsoid, where g1 falls and rises again, a bracket
+        # from there held the largest of three roots.
         return size / df if self.multiplier is None and 1.0 < df < math.inf else size
 
     @outlined
     def bracket(self, sign, first):
-        """Two sizes of kappa with F < 0 and F >= 0, the latter `first` doubled some times; whether they were found."""
-        # Doubling from below meets the smallest root first, and it ends: (K) has F > 0 both far out and before the
+        """Return two kappa with F < 0 and F >= 0, the latter `first` times a power of 2, and whether they exist."""
+        # Doubling from below meets the smallest root first, and ends: (K) has F > 0 both far out and before the
         # pole.
         farthest = abs(self.surface.farthest_push())
         low, high = 0.0, min(first, 0.5 * farthest)
         for _i in range(_DOUBLINGS):
             f = sign * self.residual(sign * high).value
             if not abs(f) < math.inf:
-                # A push that is not defined so far.
+                # A push beyond the domain
                 farthest = high
                 high = 0.5 * (low + high)
             elif f >= 0.0:
@@ -216,7 +216,7 @@ class Equation(Record):
 
 
 def equation(law, multiplier, surface, step):
-    """The `Equation` of one surface in one step."""
+    """Return the `Equation` of one surface in one step."""
     return Equation(law, multiplier, surface, step, start_of(multiplier, surface, step.r))
 
 
@@ -224,7 +224,7 @@ def equation(law, multiplier, surface, step):
 
 
 def _guess(surface, law, step):
-    """kappa if the wall were flat and the spring linear."""
+    """Return kappa for a flat wall and a linear spring."""
     q0 = surface.inner(step.r)
     g0 = surface.gap_of(q0)
     rise, drise = surface.free_rise(step.r, step.p)
@@ -253,10 +253,10 @@ def _improve(surface, law, multiplier, step, kappa):
 
 
 def guess(walls, wall, *given):
-    """`_guess` of a wall."""
+    """`_guess` for a wall."""
     return walls.of(wall, 0.0, _guess, *given)
 
 
 def improve(walls, wall, *given):
-    """`_improve` of a wall."""
+    """`_improve` for a wall."""
     return walls.of(wall, Newton(0.0, False, LoopRecord(0.0, 0.0, 0.0)), _improve, *given)

@@ -17,17 +17,17 @@ from ..surfaces.wall_law import leave_of, lets_wait, may_end, mirrored, tries_of
 # A squared speed into the wall counts as 0 up to this fraction of the squared speeds before and after the law, relative
 # to the wall and in the frame of the scene: a law adds the velocity of the wall to one that may be far smaller.
 _ROUND_OFF = 1e-30
-# Of |v|^2, the change by a law that is round-off of it or of the normal.
+# A relative change of |v|^2 by a law that is round-off of |v|^2 or of the normal.
 KEPT = 1e-12
 
 
 class Laws(Record):
-    """The effects of impacts on a particle besides turning it round."""
+    """The effects of impacts on a particle besides the reflection."""
 
     restitution: Any  # None, or e of each wall
     friction: Any  # None, or mu of each wall
     thermal: Any  # None, or `Thermal` of each wall
-    moving: Any  # None, or `Moves` where a wall moves
+    moving: Any  # None, or `Moves` if a wall moves
     own: Any = None  # None, or `Owned` of the surfaces that have `laws`
     across: Any = None  # None, or the axis across the plane in which all particles stay
 
@@ -43,26 +43,26 @@ class Laws(Record):
 
     @property
     def send_off(self):
-        """Whether a wall may send a particle off by a law, of a temperature or its own: a constant for the compiler."""
+        """Whether walls may send particles off by a temperature or a user-defined law: a constant for the compiler."""
         return self.thermal is not None or self.own is not None
 
     @property
     def may_dissipate(self):
-        """Whether some of what such a law changes of the energy may be dissipated: a constant for the compiler."""
+        """Whether such a law may dissipate a part of the energy that it changes: a constant for the compiler."""
         return any(law.book == "dissipated" for one in self.own or () for some in one.each for law in some.laws)
 
     @property
     def dissipate_all(self):
-        """Whether all of that is: a constant for the compiler."""
+        """Whether such laws dissipate all energy that they change: a constant for the compiler."""
         return self.own is not None and self.thermal is None and all(one.dissipates for one in self.own)
 
     @property
     def give_heat(self):
-        """Whether some of it may be heat: a constant for the compiler."""
+        """Whether a part of this energy may be heat: a constant for the compiler."""
         return self.send_off and not self.dissipate_all
 
     def keep_speed(self):
-        """Whether every impact keeps the speed relative to its wall, as far as the trials of the laws say."""
+        """Whether every impact keeps the speed relative to its wall, in the trials of the laws."""
         own = [law for one in self.own or () for some in one.each for law in some.laws]
         return not self.loses and self.thermal is None and all(map(_keeps_speed, own))
 
@@ -77,19 +77,19 @@ class Laws(Record):
         return any(lets_wait(law) for one in self.own or () for some in one.each for law in some.laws)
 
     def in_plane(self, across):
-        """These laws in a scene with a plane across the axis of this number, None where it has none."""
+        """Return these laws in a scene with a plane across the axis of this number, or without a plane for None."""
         return self if across is None or not self.send_off else self._replace(across=AXES[across](1.0))
 
     def restitution_of(self, wall):
-        """e of a wall."""
+        """Return e of a wall."""
         return of_wall(self.restitution, wall, 1.0)
 
     def friction_of(self, wall):
-        """mu of a wall."""
+        """Return mu of a wall."""
         return of_wall(self.friction, wall)
 
     def thermal_of(self, wall):
-        """`Thermal` of a wall."""
+        """Return the `Thermal` of a wall."""
         return of_wall(self.thermal, wall, Thermal(0.0, 0.0))
 
 
@@ -98,14 +98,14 @@ NONE = Laws(None, None, None, None)
 
 
 class Span(Record):
-    """One value of a law for so many walls in a row."""
+    """One value of a law for `walls` walls in a row."""
 
     value: Any
     walls: float
 
 
 class Some(Record):
-    """The laws of the walls from number `first` on, before number `after`."""
+    """The laws of the walls from number `first` to before number `after`."""
 
     laws: Any
     first: float
@@ -117,7 +117,7 @@ class Some(Record):
 
 
 class Owned(Record):
-    """The laws of walls with lists of laws that differ in their numbers only."""
+    """The laws of walls with lists of laws that differ only in their numbers."""
 
     each: Any
 
@@ -130,18 +130,18 @@ class Owned(Record):
 
     @property
     def dissipates(self):
-        """Whether all that these laws change of the energy is dissipated: a constant for the compiler."""
+        """Whether these laws dissipate all energy that they change: a constant for the compiler."""
         return all(law.book == "dissipated" for law in self.each[0].laws)
 
     def laws_of(self, wall):
-        """The laws of a wall, in their order."""
+        """Return the laws of a wall, in their order."""
         found = self.each[-1].laws
         for one in reversed(self.each[:-1]):
             found = select(one.has(wall), one.laws, found)
         return found
 
     def leave(self, wall, v, n, u, random, mass):
-        """`Ended` after all laws: each takes what a mirror would turn into what the one before sends."""
+        """Return `Ended` after all laws: each law acts on the mirrored velocity of the law before it."""
         stays, wait, lost, is_right = True, 0.0, 0.0, True
         first, heat = square(v - u), 0.0
         for k, law in enumerate(self.laws_of(wall)):
@@ -159,15 +159,15 @@ class Owned(Record):
             is_right = (((away >= 0.0) | (away * away <= _ROUND_OFF * speed2)) & (speed2 < math.inf)) & is_right
             v = left.v
         if any(law.book == "dissipated" for law in self.each[0].laws):
-            # What the others change is round-off: then all of it is lost.
+            # The change by the other laws is round-off: then all of it is lost.
             lost = select(heat <= KEPT * first, math.inf, lost)
         return Ended(v, stays, wait, lost, is_right & (wait >= 0.0))
 
 
 class Ended(Record):
-    """The end of an impact by the laws of a wall: `Leave`, what they dissipate, and whether all velocities are right.
+    """The end of an impact by the laws of a wall: `Leave`, the dissipated energy, and whether all velocities are valid.
 
-    `lost` is twice the energy per mass, relative to the wall; without end where that is all the change there is.
+    `lost` is twice the energy per mass, relative to the wall; infinite if it is the whole change.
     """
 
     v: Any
@@ -184,7 +184,7 @@ class Moves(Record):
 
 
 class Thermal(Record):
-    """A thermal wall, or one that is not, with the accommodation 0."""
+    """A thermal wall; accommodation 0 for a wall that is not thermal."""
 
     energy: float  # k_B T [J]
     accommodation: float
@@ -195,7 +195,7 @@ class Thermal(Record):
 
 
 def of_wall(given, wall, neutral=0.0):
-    """The part of a law that is of this wall, `neutral` where no wall has the law."""
+    """Return the value of a law for this wall, `neutral` if no wall has the law."""
     each: Any = ()
     first = 0.0
     for one in given or ():
@@ -212,9 +212,9 @@ def of_wall(given, wall, neutral=0.0):
 def owned_in(
     spans: Iterable[tuple[int, int]], pieces: Sequence[Any], owners: Sequence[int]
 ) -> tuple[Owned, ...] | None:
-    """`Owned` of all pieces of a scene that have `laws`, or None.
+    """Return `Owned` of all pieces of a scene that have `laws`, or None.
 
-    `spans` are (number of a piece, how many walls in a row are of it), `owners` the surfaces that pieces are of.
+    `spans` are (number of a piece, number of its walls in a row), `owners` the surfaces of the pieces.
     """
     owned: list[Some] = []
     first = 0
@@ -222,8 +222,8 @@ def owned_in(
         laws = pieces[i].laws
         if any(isinstance(law, str) for law in laws):
             raise SceneError(
-                f"surfaces[{owners[i]}].laws: {laws[0]!r} is Python, of which a file holds the name; build the scene "
-                "in Python, as the run's script does"
+                f"surfaces[{owners[i]}].laws: {laws[0]!r} is a Python object, of which a file has only the name; build "
+                "the scene in Python, as the script of the run does"
             )
         if laws and owned and owned[-1].after == first and owned[-1].laws == laws:
             owned[-1] = owned[-1]._replace(after=float(first + walls))
@@ -237,7 +237,7 @@ def owned_in(
 
 
 def _keeps_speed(law: Any) -> bool:
-    """Whether every particle of its trials stays in the run with the speed with which it came, and does not wait."""
+    """Whether every particle of its trials stays in the run with the speed of its arrival, and does not wait."""
     for v, _n, given in tries_of(law):
         after, stays, wait = leave_of(given)
         if not stays or wait > 0.0 or abs(square(after) - square(v)) > KEPT * square(v):

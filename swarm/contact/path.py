@@ -1,4 +1,4 @@
-"""A step of a particle that slides: the places on its way."""
+"""A step of a sliding particle: the places on its path."""
 
 import math
 from typing import Any
@@ -8,9 +8,9 @@ from ..kernel.vector import Vec, norm
 from ..surfaces.in_motion.moving import Moving
 from ..surfaces.in_motion.posed import Posed
 
-# Places of a step that are looked at, and halvings down to an instant.
+# Places of a step that are tested, and halvings down to an instant.
 PLACES, _HALVINGS = 16, 60
-# A part before all of a step.
+# A part before all parts of a step.
 BEFORE = -1.0
 
 
@@ -25,19 +25,19 @@ class StepPath(Record):
 
 
 def reach_of(path):
-    """No place of a step is farther from its end than this.
+    """Return a distance from the end of a step that no place of it exceeds.
 
-    It is twice the length of the step: what is farther from its end, by a distance of first order, is not on its way.
+    It is twice the length of the step: a place farther from its end, by a distance of first order, is not on its path.
     """
     return norm(path.r1 - path.r0) + path.h * (norm(path.v0) + norm(path.v1))
 
 
 def first_true(question, given, start, surely, about, closer=None):
-    """The part of a step, later than `start`, from which on question(*given, margin, part) is true; or infinity.
+    """Return the part of a step, later than `start`, from which question(*given, margin, part) is true; or infinity.
 
-    With BEFORE as the `start` that of the step is asked too. Equidistant parts are asked with the margin `surely`; from
-    the first one where the answer is yes, it is bisected down to where the answer with the margin `about` changes.
-    `closer`, if any, is a function closer(*given, margin, low, part, high) that returns the part to ask in place of
+    With `start` = BEFORE the part 0 is included. Equidistant parts are tested with the margin `surely`; from
+    the first one with the answer yes, it is bisected down to where the answer with the margin `about` changes.
+    `closer`, if any, is a function closer(*given, margin, low, part, high) that returns the part to test instead of
     `part`, between two others.
     """
     low = max(start, 0.0)
@@ -52,7 +52,7 @@ def first_true(question, given, start, surely, about, closer=None):
 
 
 def _bisected(question, given, low, high):
-    """The part of a step from which on question(*given, part) is true, as it is at `high` and not at `low`."""
+    """Return the part from which question(*given, part) is true, as it is at `high` and not at `low`."""
     for _i in range(_HALVINGS):
         middle = 0.5 * (low + high)
         if question(*given, middle):
@@ -63,13 +63,13 @@ def _bisected(question, given, low, high):
 
 
 def at_part(path, s):
-    """The place on the cubic through both ends of a step."""
+    """Return the place on the cubic through both ends of a step."""
     r0, a, b, c = cubic(path)
     return r0 + s * (a + s * (b + s * c))
 
 
 def cubic(path):
-    """The cubic through both ends of a step, as the coefficients of the powers of the part of it."""
+    """Return the cubic through both ends of a step, as the coefficients of the powers of the part."""
     d, h = path.r1 - path.r0, path.h
     # Hermite's form
     a, b = 3.0 * d - h * (2.0 * path.v0 + path.v1), h * (path.v0 + path.v1) - 2.0 * d
@@ -77,5 +77,5 @@ def cubic(path):
 
 
 def members_of(field):
-    """The bodies of a field."""
+    """Return the bodies of a field."""
     return field.body if isinstance(field, (Posed, Moving)) else field

@@ -8,7 +8,7 @@ from ..kernel.limits import EPSILON
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, column, cross, dot, largest, norm, put, total
 
-# Directions this close to forbidden, relative to |w|, are allowed: round-off of the normals.
+# Directions that are forbidden by less than this, relative to |w|, are allowed: round-off of the normals.
 ALLOWED = 64.0 * EPSILON
 # Sweeps until r1 and the discrete gradients agree: each gains the digits of h |v|/R.
 _SWEEPS = 60
@@ -17,12 +17,12 @@ _SWEEPS = 60
 class Touch(Record):
     """The walls near a sliding particle, one entry each."""
 
-    number: Any  # of the wall
-    touched: Any  # whether it is
-    normal: Any  # (3, walls): unit normal of the step
-    active: Any  # the part of the velocity that the wall takes
+    number: Any  # the number of the wall
+    touched: Any  # whether it is touched
+    normal: Any  # (3, walls): unit normal in the step
+    active: Any  # the part of the velocity that each wall takes
     depth: Any  # signed distance outside
-    frame: Any  # None, or a velocity with which they move along their normals
+    frame: Any  # None, or a velocity with which the walls move along their normals
 
 
 class Edge(Record):
@@ -31,14 +31,14 @@ class Edge(Record):
     e: Vec
     m: Vec
     cosine: float
-    sine: float  # 0 where they have no edge
+    sine: float  # 0 without an edge
 
 
 @outlined
 def project(touched, normal, active, w):
-    """The nearest vector u to w with n.u <= 0 for the touched walls; w - u = sum of held n, held >= 0.
+    """Return the nearest vector u to w with n.u <= 0 for the touched walls; w - u = sum of held n, held >= 0.
 
-    `normal` (3, walls) has their unit normals. At most three walls carry: one, then an edge of two, then a corner.
+    `normal` (3, walls) are their unit normals. At most three walls carry: one, then an edge of two, then a corner.
     """
     count = touched.size
     active[:] = 0.0
@@ -64,7 +64,7 @@ def project(touched, normal, active, w):
 
 
 def along(normal, i, a):
-    """The component of a vector along the normal of wall i."""
+    """Return the component of a vector along the normal of wall i."""
     return dot(column(normal, 0, i), a)
 
 
@@ -79,7 +79,7 @@ def _allowed(touched, normal, u, near):
 
 @outlined
 def _on_edge(normal, i, j, w):
-    """w along the edge of two walls, and what each takes; -1 where they have no edge."""
+    """Return w along the edge of two walls, and the part of each wall; -1 without an edge."""
     edge = _edge(normal, i, j)
     if edge.sine == 0.0:
         return ZERO, -1.0, -1.0
@@ -89,10 +89,10 @@ def _on_edge(normal, i, j, w):
 
 @outlined
 def _edge(normal, i, j):
-    """The edge of two walls.
+    """Return the edge of two walls.
 
-    e is orthogonal to n_i and to n_j -+ n_i to round-off, so to both normals also where they are nearly opposite, as
-    in a cusp: n_i x n_j alone would be off by the round-off over the sine.
+    e is orthogonal to n_i and to n_j -+ n_i to round-off, so to both normals even if they are nearly opposite, as
+    in a cusp: n_i x n_j alone would be wrong by the round-off over the sine.
     """
     n = column(normal, 0, i)
     cosine = along(normal, j, n)
@@ -108,7 +108,7 @@ def _edge(normal, i, j):
 
 @outlined
 def _carried(touched, normal, active, w):
-    """The part of w that each wall of a corner takes: the first three that carry it."""
+    """Set the part of w that each wall of a corner takes: the first three walls that carry it."""
     count = touched.size
     for i in range(count):
         for j in range(i):
@@ -118,7 +118,7 @@ def _carried(touched, normal, active, w):
                     steepness = along(normal, k, e)
                     if steepness == 0.0:
                         continue
-                    # The edge of two takes nothing along itself: that part is the third wall's.
+                    # The edge of two walls takes nothing along itself: that part is the third wall's.
                     r = dot(w, e) / steepness
                     _u, p, q = _on_edge(normal, i, j, w - r * column(normal, 0, k))
                     if p >= 0.0 and q >= 0.0 and r >= 0.0:
@@ -126,12 +126,12 @@ def _carried(touched, normal, active, w):
                         return
 
 
-# --- Of a step -------------------------------------------------------------------------------------------
+# --- The projection for a step ---------------------------------------------------------------------------
 
 
 @outlined
 def velocity_along(walls, touch, r, w, h):
-    """P: w without what the touched walls forbid between r0 and r1 = r0 + h P."""
+    """Return P: w without the directions that the touched walls forbid between r0 and r1 = r0 + h P."""
     u, r1 = ZERO, r
     for _sweep in range(_SWEEPS):
         put_normals(walls, touch, touch.touched, r, r1)
@@ -144,7 +144,7 @@ def velocity_along(walls, touch, r, w, h):
 
 @outlined
 def put_normals(walls, touch, which, r0, r1):
-    """The unit vector along the discrete gradient of each of these walls, out of the admissible side, into `touch`."""
+    """Write the unit vector along the discrete gradient of each wall in `which`, pointing outside, to `touch`."""
     for i in range(which.size):
         if which[i]:
             put(touch.normal, 0, i, _normal(walls, touch.number[i], r0, r1))
@@ -152,7 +152,7 @@ def put_normals(walls, touch, which, r0, r1):
 
 @outlined
 def _normal(walls, wall, r0, r1):
-    """The unit vector along the discrete gradient of a wall, out of the admissible side."""
+    """Return the unit vector along the discrete gradient of a wall, out of the admissible side."""
     n = walls.unit_normal(wall, r0)
     d = walls.discrete_gradient(wall, r0, r1)
     length = norm(d)

@@ -3,8 +3,8 @@
 Phi(g) = sqrt(2/(a+1)) max(g, 0)^((a+1)/2)                      [García Orden & Ortega 2007, eq. (2)]
 so V(g) = alpha g^(a+1)/(a+1) for g > 0: a linear spring for a = 1, Hertz's law for a = 1.5.
 
-The penalty force of a step is the divided difference V[g0, g1] = (V1 - V0)/(g1 - g0), whatever the two gaps
-are; the energy balance needs nothing else. A multiplier lambda adds lambda Phi[g0, g1]. Where both gaps are positive
+The penalty force of a step is the divided difference V[g0, g1] = (V1 - V0)/(g1 - g0) for any two
+gaps; the energy balance needs nothing else. A multiplier lambda adds lambda Phi[g0, g1]. Where both gaps are positive
 and close, the quotients would cancel, so each law has forms that do not.
 """
 
@@ -16,14 +16,14 @@ from ..kernel.record import Record
 
 
 class Law(Record):
-    """A law of one stiffness alpha, the penalty."""
+    """A law with one stiffness alpha, the penalty."""
 
     def stiffened(self: Any, factor: Any) -> Any:
-        """The same law with `factor` times the penalty."""
+        """Return the same law with `factor` times the penalty."""
         return self._replace(alpha=factor * self.alpha)
 
     def force(self: Any, multiplier: Any, g0: Any, g1: Any) -> Any:
-        """The contact force of a step, V[g0, g1] + lambda Phi[g0, g1], and its derivative by g1."""
+        """Return the contact force of a step, V[g0, g1] + lambda Phi[g0, g1], and its derivative by g1."""
         spring, dspring = self.energy_slope(g0, g1)
         if multiplier is None:
             return spring, dspring
@@ -32,7 +32,7 @@ class Law(Record):
 
 
 def regularisation(penalty: float, exponent: float) -> Any:
-    """The law with the cheapest arithmetic for this exponent."""
+    """Return the law with the cheapest arithmetic for this exponent."""
     if exponent == 1.0:
         return Linear(penalty)
     if exponent == 1.5:
@@ -45,7 +45,7 @@ def _positive(g):
 
 
 def _quotient(v0, v1, force1, d):
-    """The plain quotient and its derivative, where one of the gaps is not positive; 0 where both are not."""
+    """Return the plain quotient and its derivative, if one of the gaps is not positive; 0 if both are not."""
     inverse = 1.0 / select(d == 0.0, 1.0, d)
     slope = (v1 - v0) * inverse
     return slope, (force1 - slope) * inverse
@@ -82,11 +82,11 @@ class Linear(Law):
         return _positive(g)
 
     def constraint_gradient(self, g):
-        """Phi'(g), from the outside where it jumps: sqrt((a+1)/2) g^((a-1)/2) for g >= 0, eq. (3), and 0 for g < 0."""
+        """Phi'(g), the outer limit at a jump: sqrt((a+1)/2) g^((a-1)/2) for g >= 0, eq. (3), and 0 for g < 0."""
         return select(g >= 0.0, 1.0, 0.0)
 
     def constraint_slope(self, g0, g1):
-        """Phi[g0, g1] and its derivative by g1; Phi' where the gaps are the same."""
+        """Phi[g0, g1] and its derivative by g1; Phi' for equal gaps."""
         slope, curvature = _quotient(_positive(g0), _positive(g1), select(g1 >= 0.0, 1.0, 0.0), g1 - g0)
         both = (g0 >= 0.0) & (g1 >= 0.0)
         return select(both, 1.0, slope), select(both, 0.0, curvature)
@@ -133,11 +133,11 @@ class Hertz(Law):
         return _HERTZ * p * math.sqrt(math.sqrt(p))
 
     def constraint_gradient(self, g):
-        """Phi'(g), from the outside where it jumps: sqrt((a+1)/2) g^((a-1)/2) for g >= 0, eq. (3), and 0 for g < 0."""
+        """Phi'(g), the outer limit at a jump: sqrt((a+1)/2) g^((a-1)/2) for g >= 0, eq. (3), and 0 for g < 0."""
         return 1.25 * _HERTZ * math.sqrt(math.sqrt(_positive(g)))
 
     def constraint_slope(self, g0, g1):
-        """Phi[g0, g1] and its derivative by g1; Phi' where the gaps are the same."""
+        """Phi[g0, g1] and its derivative by g1; Phi' for equal gaps."""
         p0, p1 = _positive(g0), _positive(g1)
         u0, u1 = math.sqrt(p0), math.sqrt(p1)
         w0, w1 = math.sqrt(u0), math.sqrt(u1)
@@ -146,7 +146,7 @@ class Hertz(Law):
         # with w = g^(1/4): (w1^5 - w0^5)/(w1^4 - w0^4) = (w1^4 + w1^3 w0 + ... + w0^4)/((w1 + w0)(w1^2 + w0^2))
         total = select(both, (w0 + w1) * (u0 + u1), 1.0)
         n = p1 + w1 * w0 * (u1 + w1 * w0 + u0) + p0
-        # their derivatives by w1, and dw/dg = 1/(4 w^3)
+        # the derivatives of numerator and denominator by w1, and dw/dg = 1/(4 w^3)
         dn = 4.0 * w1 * u1 + 3.0 * u1 * w0 + 2.0 * w1 * u0 + u0 * w0
         dtotal = u0 + u1 + 2.0 * w1 * (w0 + w1)
         s = n / total
@@ -165,11 +165,11 @@ _CLOSE = 1.0 / 16.0
 
 
 def _power_slope(b, g0, g1):
-    """Divided difference of max(g, 0)^b, b >= 1, and its derivative by g1."""
+    """Return the divided difference of max(g, 0)^b, b >= 1, and its derivative by g1."""
     d = g1 - g0
     p0, p1 = _positive(g0), _positive(g1)
     if g0 > 0.0 and g1 > 0.0 and abs(d) * (b + 2.0) < _CLOSE * g0:
-        # It is the mean of the derivative b g^(b-1) between the two gaps.
+        # The divided difference is the mean of the derivative b g^(b-1) between the two gaps.
         slope, curvature = 0.0, 0.0
         for i in range(3):
             g = g0 + _THETA[i] * d
@@ -211,11 +211,11 @@ class Power(Law):
         return math.sqrt(2.0 / (self.a + 1.0)) * _positive(g) ** (0.5 * (self.a + 1.0))
 
     def constraint_gradient(self, g):
-        """Phi'(g), from the outside where it jumps: sqrt((a+1)/2) g^((a-1)/2) for g >= 0, eq. (3), and 0 for g < 0."""
+        """Phi'(g), the outer limit at a jump: sqrt((a+1)/2) g^((a-1)/2) for g >= 0, eq. (3), and 0 for g < 0."""
         return select(g >= 0.0, math.sqrt(0.5 * (self.a + 1.0)) * _positive(g) ** (0.5 * (self.a - 1.0)), 0.0)
 
     def constraint_slope(self, g0, g1):
-        """Phi[g0, g1] and its derivative by g1; Phi' where the gaps are the same."""
+        """Phi[g0, g1] and its derivative by g1; Phi' for equal gaps."""
         slope, curvature = _power_slope(0.5 * (self.a + 1.0), g0, g1)
         k = math.sqrt(2.0 / (self.a + 1.0))
         return k * slope, k * curvature

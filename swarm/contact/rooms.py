@@ -1,4 +1,4 @@
-"""Where a step of a particle that slides leaves the rooms of a union, and at which of their walls."""
+"""Where a step of a sliding particle leaves the rooms of a union, and at which of their walls."""
 
 import math
 
@@ -13,23 +13,23 @@ from .path import at_part, first_true
 
 @outlined
 def leaving(walls, spans, active, path, near, remaining):
-    """The part of a step after which it leaves a union, infinite where it does not, and the wall: (part, wall).
+    """Return (the part of a step after which it leaves a union, the wall there); the part is infinite if it stays.
 
-    `spans` are the first and the last wall of each room. It leaves where it leaves the last of the rooms that it is in,
-    and is inside of no other. What lies on a wall that holds the particle is no wall to it.
+    `spans` are the first and the last wall of each room. A step leaves the union where it leaves the last of the rooms
+    that it is in, and is inside of no other. A wall that lies on a wall that holds the particle does not count.
     """
     inside = scratch(len(spans), np.bool_)
     nearest, held = math.inf, False
     for span in spans:
         nearest = min(nearest, _deepest(walls, span, active, path, remaining, 0.0)[0])
         held = held or _holds(active, span)
-    # It begins in the room with the wall that holds it, or in the nearest one; in another one if it is inside that by
-    # more than `near`: rooms that touch are apart.
+    # It begins in the room with the wall that holds it, or in the nearest room; also in another room if it is inside of
+    # that by more than `near`: rooms that touch are apart.
     _enter(walls, spans, active, path, remaining, 0.0, -near if held else max(near, nearest), inside)
     for k, span in enumerate(spans):
         inside[k] = inside[k] or _holds(active, span)
     part, wall = 0.0, -1.0
-    # Each time round it is in another room.
+    # Each iteration is in another room.
     for _room in range(4 * len(spans)):
         latest = -1.0
         for k, span in enumerate(spans):
@@ -46,7 +46,7 @@ def leaving(walls, spans, active, path, near, remaining):
 
 
 def _holds(active, span):
-    """Whether one of the walls that hold a particle is one of a room."""
+    """Whether a wall that holds a particle is one of a room."""
     found = False
     for one in active:
         found = found or span[0] <= one <= span[1]
@@ -55,7 +55,7 @@ def _holds(active, span):
 
 @outlined
 def _enter(walls, spans, active, path, remaining, part, most, inside):
-    """Note which rooms are no farther than `most` after a part of a step; whether any is."""
+    """Mark the rooms that are no farther than `most` after a part of a step; return whether there is one."""
     goes_on = False
     for k, span in enumerate(spans):
         inside[k] = _deepest(walls, span, active, path, remaining, part)[0] <= most
@@ -65,7 +65,7 @@ def _enter(walls, spans, active, path, remaining, part, most, inside):
 
 @outlined
 def _left(walls, span, active, path, near, remaining, part):
-    """The part of a step, from one on, after which it leaves a room, infinite where it does not, and the wall."""
+    """Return the part of a step, from `part` on, after which it leaves a room, or infinity, and the wall."""
     number = _wall_ahead(walls, span, active, path, near, remaining) if part == 0.0 else -1.0
     if number >= 0.0:
         return 0.0, number
@@ -80,7 +80,7 @@ def _is_out(walls, span, active, path, remaining, depth, part):
 
 @outlined
 def _wall_ahead(walls, span, active, path, near, remaining):
-    """The wall of a room that a step is at in its beginning, and goes into; or -1."""
+    """Return the wall of a room that a step begins at and goes into, or -1."""
     now, (number, last) = walls.at(remaining), span
     while number <= last:
         towards = dot(now.unit_normal(number, path.r0), path.v0 - now.velocity(number, path.r0))
@@ -93,7 +93,7 @@ def _wall_ahead(walls, span, active, path, near, remaining):
 
 @outlined
 def _deepest(walls, span, active, path, remaining, part):
-    """The largest distance outside of the walls of a room, after a part of a step, and the wall."""
+    """Return the largest distance outside of the walls of a room after a part of a step, and the wall."""
     now, r, (number, last) = walls.at(remaining - part * path.h), at_part(path, part), span
     deepest, wall = -math.inf, number
     while number <= last:
@@ -106,7 +106,7 @@ def _deepest(walls, span, active, path, remaining, part):
 
 @outlined
 def _is_or_lies_on(walls, active, number, r):
-    """Whether a wall is one of those that hold the particle, or lies on one."""
+    """Whether a wall holds the particle, or lies on a wall that does."""
     found = active.has(number)
     for one in active:
         found = found or (one >= 0.0 and lie_on_each_other(walls, one, number, r))

@@ -1,4 +1,4 @@
-"""Impacts that follow one another too quickly to be resolved: grazing, rolling along a wall, resting, corners, cusps.
+"""Impacts that follow each other too quickly to be resolved: grazing, rolling along a wall, resting, corners, cusps.
 
 A sliding step of length h holds the particle on every wall it touches: with w0 = v0 + h G/2 and P the projection of
 w0 on the directions that no touched wall forbids, r1 = r0 + h P and w1 = 2 P - w0. P and w0 - P are orthogonal
@@ -21,17 +21,17 @@ from .laws import Laws
 from .projection import ALLOWED, Touch, along, project, put_normals, velocity_along
 from .reflection import from_relative, relative
 
-# A second wall nearer than this part of the shortest flight is met in the same instant.
+# A second wall nearer than this fraction of the shortest flight is met at the same instant.
 _SAME_INSTANT = 1e-6
-# The most exact reflections within one instant: as many turn a particle around in the edge of a wedge of 0.05 rad.
+# The most exact reflections within one instant: this number turns a particle around in the edge of a wedge of 0.05 rad.
 _BLOWS = 64
 # Sweeps until r1 and the discrete gradients agree: each gains the digits of h |v|/R.
 _SWEEPS = 60
-# The velocity of a particle along the normal of a wall that moves may be off by this part of the wall's speed.
+# The velocity of a particle along the normal of a moving wall may be wrong by this fraction of the wall's speed.
 _OFF = 1e-13
-# A step is cut at most so many times because another wall is in the way.
+# The most cuts of a step because another wall is in the way.
 _CUTS = 60
-# What the functions here ask of every wall; exact reflections ask for no more.
+# The functions of every wall that this module needs; exact reflections need no others.
 NEEDS = ("first_hit", "unit_normal", "discrete_gradient", "distance", "project")
 
 
@@ -40,12 +40,12 @@ class ImpactSettings(Record):
 
     contact_step: Any  # None or h
     laws: Laws
-    shortest: float  # flight: the particle slides instead of shorter ones [s]
-    touch: float  # distance within which walls hold a sliding particle too [m]
+    shortest: float  # the shortest flight: the particle slides instead of shorter ones [s]
+    touch: float  # distance within which walls also hold a sliding particle [m]
 
 
 class ParticleMoment(Record):
-    """A particle at a moment, with so much of the frame left [s]."""
+    """A particle at a moment, when `remaining` is left of the frame [s]."""
 
     r: Vec
     v: Vec
@@ -63,11 +63,11 @@ class Landing(Record):
 
 @outlined
 def impact(method, walls, gravity, wall, flight, energy, impulse, lane):
-    """One impact of one particle on `wall` after a short flight.
+    """Make one impact of one particle on `wall` after a short flight; return its `Landing`.
 
-    Adds to impulse[:, lane] the impulse of each wall and, where the array has rows for it, the work per mass of each
-    behind them. If the flight after the impact would be shorter than the shortest too, the particle slides instead: for
-    as long as the shortest flight or, where it goes straight on, to the end of the frame.
+    Add to impulse[:, lane] the impulse of each wall and, if the array has rows for it, the work per mass of each
+    behind them. If the flight after the impact would also be shorter than the shortest, the particle slides: for
+    the shortest flight or, if it moves straight on, to the end of the frame.
     """
     r, v, half_inverse = flight.r, flight.v, energy.half_inverse
     carried, walls = walls, walls.at(flight.remaining)
@@ -98,7 +98,7 @@ def impact(method, walls, gravity, wall, flight, energy, impulse, lane):
 
 @outlined
 def _slide(method, walls, gravity, wall, flight, energy, impulse, lane):
-    """One sliding step: the result of `impact`."""
+    """Make one sliding step; return the result of `impact`."""
     laws, r, moving = method.laws, flight.r, method.laws.moving
     carried, walls = walls, walls.at(flight.remaining)
     number = walls.numbers_near(r)
@@ -138,7 +138,7 @@ def _slide(method, walls, gravity, wall, flight, energy, impulse, lane):
 
 @outlined
 def _frame_of(walls, number, touched, r):
-    """A velocity with which all touched walls move along their normals."""
+    """Return a velocity with which all touched walls move along their normals."""
     u = _swept(walls, number, touched, r, ZERO)
     for i in range(touched.size):
         if touched[i]:
@@ -151,7 +151,7 @@ def _frame_of(walls, number, touched, r):
 
 @outlined
 def _swept(walls, number, touched, r, u):
-    """Such a velocity near another one: of one wall after the other, as in Kaczmarz' method."""
+    """Return such a velocity near u: of one wall after the other, as in Kaczmarz' method."""
     for _sweep in range(_SWEEPS):
         for i in range(touched.size):
             if touched[i]:
@@ -162,14 +162,14 @@ def _swept(walls, number, touched, r, u):
 
 @outlined
 def _unhindered(walls, gravity, touch, r, v, h, near):
-    """P of the longest step up to h that no further wall is in the way of, and its length.
+    """Return P of the longest step up to h without a further wall in its way, and the length of the step.
 
     A wall that is met within the distance `near` becomes one of the touched.
     """
     u = ZERO
     for cut in range(_CUTS):
         u = velocity_along(walls, touch, r, accelerated(gravity, v, 0.5 * h), h)
-        # Until then none but the near walls are met.
+        # Until then only the near walls are met.
         alone = walls.until_others(r, from_relative(touch.frame, u))
         if alone < h:
             h = alone
@@ -185,14 +185,14 @@ def _unhindered(walls, gravity, touch, r, v, h, near):
         if following * norm(u) <= near:
             touch.touched[other] = True
         else:
-            # The step to that wall is another one, since its walls curve and gravity has less time.
+            # The step to that wall is different, since its walls curve and gravity has less time.
             h = following if cut < _CUTS // 2 else 0.5 * following
     return u, h
 
 
 @outlined
 def _end_of_step(walls, moving, wall, r, u, during):
-    """The end of a step from r with the velocity u, straight in the frame of the wall.
+    """Return the end of a step from r with the velocity u, straight in the frame of the wall.
 
     Straight in the scene, the step would leave a corner that turns by half its acceleration times h^2, which is beyond
     the edges of all facets there.
@@ -207,10 +207,10 @@ def _end_of_step(walls, moving, wall, r, u, during):
 
 @outlined
 def _settled(walls, wall, touch, r, near):
-    """The end of a step on the wall that holds the particle, and on every touched one that it has left by round-off.
+    """Return the end of a step on the wall that holds the particle, and on every touched wall left by round-off.
 
     Round-off adds up step by step: 3e-13 of the size after 5e4 steps along an edge. Each wall once: a second time only
-    where the particle is outside would lean inwards, and let it fall by the last place again and again.
+    for walls that the particle is outside of would lean inwards, and lower it by the last place again and again.
     """
     _depths(walls, touch.number, r, touch.depth)
     for i in range(touch.touched.size):
@@ -218,8 +218,8 @@ def _settled(walls, wall, touch, r, near):
         if holds or (touch.touched[i] and touch.depth[i] > 0.0):
             r = walls.project(touch.number[i], r)
     if touch.frame is not None:
-        # A wall that moves is left by more than round-off; where another one ends it is met on that one only. One that
-        # is not touched may have gained on the particle by what it accelerates, which no straight way shows.
+        # The particle leaves a moving wall by more than round-off; where another wall ends it meets only this one. A
+        # wall that is not touched may have come nearer by its acceleration, which no straight path shows.
         _depths(walls, touch.number, r, touch.depth)
         for i in range(touch.touched.size):
             if touch.depth[i] > near:
@@ -229,7 +229,7 @@ def _settled(walls, wall, touch, r, near):
 
 @outlined
 def inside(walls, r):
-    """A point that is no more than round-off outside of the walls, moved until it is not."""
+    """Return a point, no more than round-off outside of the walls, moved until it is not outside."""
     number = walls.numbers_near(r)
     outside = scratch(number.size, np.float64)
     for _sweep in range(_SWEEPS):
@@ -243,16 +243,16 @@ def inside(walls, r):
 
 @outlined
 def _depths(walls, number, r, into):
-    """Signed distance outside of walls into `into`."""
+    """Write the signed distances outside of walls to `into`."""
     for i in range(number.size):
         into[i] = walls.distance(number[i], r)
 
 
 @outlined
 def _landed(laws, walls, touch, given, r, v, twice_energy):
-    """Chattering ends: walls that lose energy take the rest of the velocity towards them.
+    """End chattering: walls that lose energy take the rest of the velocity towards them.
 
-    Together, by the projection: in an acute edge one wall after the other would take next to nothing, and the step
+    All together, by the projection: in an acute edge one wall after the other would take next to nothing, and the step
     would reflect the rest.
     """
     if not laws.change_energy:
@@ -268,7 +268,7 @@ def _landed(laws, walls, touch, given, r, v, twice_energy):
 
 @outlined
 def _goes_straight(walls, gravity, touch, r, v):
-    """Whether the step may have any length: rest, or uniform motion along flat walls that no gravity pulls it from."""
+    """Whether the step may have any length: at rest, or in uniform motion along flat walls that carry the weight."""
     g = accelerated(gravity, ZERO, 1.0)
     put_normals(walls, touch, touch.touched, r, r)
     falling = project(touch.touched, touch.normal, touch.active, g)
@@ -288,7 +288,7 @@ def _goes_straight(walls, gravity, touch, r, v):
 def are_carried(walls, gravity, r, v, near, active):
     """Whether several walls within the distance `near` carry the weight of a particle at rest.
 
-    `active` (2, walls) becomes what each carries, and its part of the impulse per mass that takes the velocity v.
+    `active` (2, walls) is set to the part of each wall, and to its part of the impulse per mass that stops v.
     """
     number = walls.numbers_near(r)
     count = number.size
@@ -302,7 +302,7 @@ def are_carried(walls, gravity, r, v, near, active):
         if touched[i]:
             put(normal, 0, i, walls.unit_normal(number[i], r))
     g = accelerated(gravity, ZERO, 1.0)
-    # v as a sum over the normals: what goes into the walls, then what goes away from them, and again.
+    # v as a sum over the normals: the part into the walls, then the part away from them, alternately.
     sign, rest = 1.0, v
     for _sweep in range(_SWEEPS):
         rest = sign * project(touched, normal, taken, sign * rest)

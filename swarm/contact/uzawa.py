@@ -26,15 +26,15 @@ PLAIN, SECANT, REFLECTION = 0.0, 1.0, 2.0
 # lambda and the miss of the sweep before; the sweeps; whether the step was accepted above the tolerance; the
 # acceleration.
 MULTIPLIER, MEAN, STORED, GAIN, BEFORE, MISS, SWEEPS, UNCONVERGED, ACCELERATION, RECORDS = range(10)
-# The secant stops this part short: beyond the last multiplier the step equation has no root.
+# The secant stops this fraction short: beyond the last multiplier the step equation has no root.
 _SHORT = 1e-3
 # Newton steps of the chord that starts the loop: it need not be exact.
 _CHORD_STEPS = 3
 
 
 def next_multiplier(acceleration, multiplier, miss, multiplier_before, miss_before):
-    """lambda after a sweep with the miss alpha (Phi0 + Phi1)/2: by (8), or the secant through the last two sweeps."""
-    # NaN in the first sweep, below 1 or infinite where the miss does not fall: then (8).
+    """Return lambda after a sweep with the miss alpha (Phi0 + Phi1)/2: by (8), or by the secant of the last two."""
+    # NaN in the first sweep, below 1 or infinite if the miss does not fall: then (8).
     stretch = (multiplier - multiplier_before) / (miss_before - miss)
     use = (acceleration > PLAIN) & (stretch >= 1.0) & (stretch < math.inf)
     return multiplier + miss * select(use, stretch * (1.0 - _SHORT), 1.0)
@@ -43,7 +43,7 @@ def next_multiplier(acceleration, multiplier, miss, multiplier_before, miss_befo
 def has_limit(surface, law, r):
     """Whether the loop has a limit: State I with Phi'(0) > 0.
 
-    Elsewhere a secant could take lambda so far that V <= tolerance, while the energy still misses lambda Phi1.
+    Otherwise a secant could take lambda so far that V <= tolerance, while the energy still misses lambda Phi1.
     """
     return (impulse.start_of(0.0, surface, r).gap == 0.0) & (law.constraint_gradient(0.0) > 0.0)
 
@@ -54,14 +54,14 @@ def is_outside(surface, r):
 
 
 def multiplier_of(surface, law, r, c, kappa):
-    """lambda from (K) with g0 = g1 = 0, kappa = c lambda Phi'(0) g'(q0); 0 away from the wall."""
+    """Return lambda from (K) with g0 = g1 = 0, kappa = c lambda Phi'(0) g'(q0); 0 away from the wall."""
     start = impulse.start_of(0.0, surface, r)
     slope, _curvature = surface.gap_slope(start.q, start.q)
     return select(start.gap == 0.0, kappa / (c * slope * law.constraint_gradient(0.0)), 0.0)
 
 
 def reflection(walls, wall, law, step):
-    """kappa and lambda of the step that ends on a wall: the fixed point of (8) in State I with a = 1."""
+    """Return kappa and lambda of the step that ends on a wall: the fixed point of (8) in State I with a = 1."""
     kappa = walls.chord_guess(wall, step.r, step.p)
     for _i in range(_CHORD_STEPS):
         kappa = kappa - walls.chord_improve(wall, step.r, step.p, kappa)
@@ -80,14 +80,14 @@ def meets_later(walls, wall, law, r, p):
 
 
 class LastSweep(Record):
-    """The multipliers and misses of the sweep before, for the secant: one entry for each wall."""
+    """The multipliers and misses of the last sweep, for the secant: one entry for each wall."""
 
     multipliers: Any
     misses: Any
 
 
 class UzawaSweep(Record):
-    """The step of one sweep: its end, V there, and whether it was solved."""
+    """The step of one sweep: its end, V at the end, and whether it was solved."""
 
     r: Vec
     stored: float
@@ -106,7 +106,7 @@ class Loop(Record):
 
 @outlined
 def sweep_all(method, law, walls, step, multipliers, before, sweep, reactions):
-    """One sweep of (8) for all walls: the `UzawaSweep` of the step; `multipliers` and `before` are updated in place."""
+    """Make one sweep of (8) for all walls; return its `UzawaSweep`; update `multipliers` and `before` in place."""
     count = multipliers.shape[0]
     end = corner.hold(method.form, law, multipliers, walls, step, reactions)
     first, last = scratch(count, np.float64), reactions[:, 3]
@@ -127,7 +127,7 @@ def sweep_all(method, law, walls, step, multipliers, before, sweep, reactions):
 
 @outlined
 def start(method, law, walls, step, multipliers):
-    """Set the multipliers that the loop starts from."""
+    """Set the multipliers from which the loop starts."""
     multipliers[:] = 0.0
     touched = walls.touched(step.r, step.p)
     if method.acceleration == REFLECTION and touched.number == 1.0:
@@ -137,7 +137,7 @@ def start(method, law, walls, step, multipliers):
 
 @outlined
 def loop(method, law, walls, step, reactions):
-    """Repeat sweeps until V <= tolerance: the `Loop`, with the step of the last sweep."""
+    """Repeat sweeps until V <= tolerance; return the `Loop` with the step of the last sweep."""
     count = walls.length()
     multipliers = scratch(count, np.float64)
     before = LastSweep(scratch(count, np.float64), scratch(count, np.float64))

@@ -1,4 +1,4 @@
-"""One impact of one particle on a wall: what becomes of the particle, and how that is booked.
+"""One impact of one particle on a wall: the velocity of the particle after it, and the accounts.
 
 Every engine takes its impacts from here. Queues of points and of balls take an impact as a whole. Lanes take it in two
 loops: one of reflections, and one of the laws by which a wall sends particles off (its temperature, or `laws`).
@@ -20,10 +20,10 @@ _NORMAL = Vec(0.0, 0.0, 1.0)
 
 
 class Arriving(Record):
-    """A particle at a wall: where, its velocity, twice its energy per mass, and its mass [kg].
+    """A particle at a wall: its place, its velocity, twice its energy per mass, and its mass [kg].
 
-    Laws do not act on what comes slower along the normal than `slow`. A ball with its centre at `r` is in contact with
-    the wall at `touch`; None: at `r`.
+    Laws do not act on a particle slower along the normal than `slow`. A ball with its centre at `r` is in contact with
+    the wall at `touch`; None means at `r`.
     """
 
     r: Vec
@@ -34,7 +34,7 @@ class Arriving(Record):
     touch: Any = None
 
     def contact(self):
-        """The point of contact with the wall."""
+        """Return the point of contact with the wall."""
         return self.r if self.touch is None else self.touch
 
 
@@ -45,14 +45,14 @@ class RandomSource(Record):
     first: Any  # the number of the first particle of this run
 
     def of_impact(self, i, number, laws):
-        """Those of an impact of particle i, which has had so many before."""
+        """Return the random numbers of an impact of particle i with the `number` of impacts before it."""
         return Stream(self.seed, self.first + i, number, 0, laws.across)
 
 
 def impact_on_wall(laws, walls, gravity, wall, arriving, random):
-    """The `Bounce` of a particle that is `Arriving` at a wall: by a law of the wall where one acts, else reflected.
+    """Return the `Bounce` of a particle that is `Arriving` at a wall: by a law of the wall if one acts, else reflected.
 
-    `random` are the random numbers of the impact, which are used by such laws alone.
+    `random` are the random numbers of the impact, which only such laws use.
     """
     bounce = exact(laws, walls, gravity, wall, arriving.r, arriving.v, energy_of(arriving.twice), arriving.contact())
     if laws.send_off:
@@ -62,7 +62,7 @@ def impact_on_wall(laws, walls, gravity, wall, arriving, random):
 
 
 def by_law(laws, walls, gravity, wall, arriving, random):
-    """Whether a law of a wall acts, and the `Bounce` then. A velocity that is not finite, or into the wall, is NaN."""
+    """Return whether a law of a wall acts, and its `Bounce`; NaN for a velocity that is not finite or into the wall."""
     r, v, mass, twice = arriving.r, arriving.v, arriving.mass, arriving.twice
     n, fall = walls.unit_normal(wall, r), 2.0 * potential(gravity, r)
     moving = wall_velocity(laws.moving, walls, wall, arriving.contact())
@@ -83,7 +83,7 @@ def by_law(laws, walls, gravity, wall, arriving, random):
     work = given(moving, after - before)
     sent, away = from_relative(moving, after), -dot(after, n)
     if laws.own is not None:
-        # A particle that is absorbed gives its normal momentum to the wall and keeps its velocity.
+        # An absorbed particle gives its normal momentum to the wall and keeps its velocity.
         stays = wait < math.inf
         speed2 = twice - fall + work
         sent = either(keeps & stays, restore(sent, speed2, energy_of(speed2).half_inverse, True), sent)
@@ -94,7 +94,7 @@ def by_law(laws, walls, gravity, wall, arriving, random):
 
 
 class _Own(Record):
-    """What the laws of a wall make of a particle, relative to the wall."""
+    """The state of a particle after the laws of a wall, relative to the wall."""
 
     v: Vec
     lost: float
@@ -103,9 +103,9 @@ class _Own(Record):
 
 
 def _own_law(laws, one, wall, at, arriving, random, acts):
-    """`_Own` by the laws `one` of a wall, with the normal and the velocity `at` it; any where they do not act."""
+    """Return `_Own` by the laws `one` of a wall, with the normal and the velocity `at` it; arbitrary without laws."""
     n, moving = at
-    # Where the laws do not act they get valid numbers: with NaN, a law of the user might not end.
+    # Laws that do not act get valid numbers: with NaN, a law of the user might not end.
     n = either(acts, -1.0 * n, _NORMAL)
     u = ZERO if moving is None else moving
     v = either(acts, arriving.v, u - n)
@@ -114,7 +114,7 @@ def _own_law(laws, one, wall, at, arriving, random, acts):
     after = ended.v - u
     is_right = ended.is_right if laws.across is None else ended.is_right & (laws.across.part(after) == 0.0)
     if moving is not None:
-        # A particle that waits would have to be carried along by the wall.
+        # A moving wall would have to carry a particle that waits.
         is_right = is_right & ((ended.wait == 0.0) | (not ended.stays))
     stays, wait = ended.stays, select(is_right & (not ended.wait < 0.0), ended.wait, 0.0)
     speed2 = square(before)
@@ -128,7 +128,7 @@ def _own_law(laws, one, wall, at, arriving, random, acts):
 
 
 def shares(laws, given, lost):
-    """What is dissipated, below 0 where a law gives energy, and the heat; `given` is the sum without its sign."""
+    """Return the dissipated energy, below 0 if a law gives energy, and the heat; `given` is heat minus dissipation."""
     if laws.dissipate_all:
         return -given, 0.0
     if not laws.may_dissipate:
@@ -138,11 +138,11 @@ def shares(laws, given, lost):
     return taken, select(all_of_it, 0.0, given + taken)
 
 
-# --- Books ---
+# --- Accounts ---
 
 
 def book(laws, books, place, mass, bounce):
-    """Book an impact, and return the heat [J]; `place` is the row of the wall, its column, and the particle."""
+    """Book an impact; return the heat [J]; `place` is (the row of the wall, its column, the particle)."""
     row, column, i = place
     books.impulse[row, column] += mass * bounce.impulse
     if laws.moving is not None:
@@ -152,12 +152,12 @@ def book(laws, books, place, mass, bounce):
 
 
 def give_work(books, row, column, work):
-    """Book the work of a wall that moves [J]: its row is as far behind that of the impulse as there are walls."""
+    """Book the work of a moving wall [J]: its row is as far behind that of the impulse as there are walls."""
     books.impulse[index(books.impulse.shape[0] // 2) + row, column] += work
 
 
 def book_energy(books, place, mass, bounce):
-    """Book what an impact dissipates, and the heat, which is returned [J]."""
+    """Book the energy that an impact dissipates, and the heat; return the heat [J]."""
     row, column, i = place
     if books.dissipated.size > 0:
         books.dissipated[i] += 0.5 * mass * bounce.lost

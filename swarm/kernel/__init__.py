@@ -1,1 +1,1 @@
-"""Parts of every kernel: the compiler's flags, dispatch, vectors, gravity."""
+"""Common parts of all kernels: flags of the compiler, dispatch, vectors, gravity."""

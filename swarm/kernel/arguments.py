@@ -1,9 +1,9 @@
-"""Arguments of a kernel, read from where Python's objects have them.
+"""Read the arguments of a kernel directly from the memory of Python's objects.
 
-Numba asks Python for each number in a tuple and looks for an error behind each: two thirds of the instructions of a
-kernel that does little, compiled as any others. It knew the types of all of them when it chose the kernel, so a float
-is read from its object, and an array's place, shape and strides from NumPy's. A sixth of the time to compile two walls
-with friction, or balls in a box.
+Numba asks Python for each number in a tuple and checks for an error after each: two thirds of the instructions of a
+short kernel, which are compiled like any others. The types of all arguments are known when the kernel is chosen, so a
+float is read from its object, and the address, shape and strides of an array from NumPy's object. This saves a sixth
+of the time to compile two walls with friction, or balls in a box.
 """
 
 from typing import Any, NamedTuple
@@ -15,26 +15,26 @@ from numba.core.callwrapper import PyCallWrapper
 from numba.core.pythonapi import NativeValue
 from numba.np.numpy_support import as_dtype
 
-# Where objects have what is read here, in words: floats and arrays behind the head of any object, tuples at their end.
+# Where objects have these data, in words: floats and arrays behind the head of any object, tuples at their end.
 _WORD = np.dtype(np.intp).itemsize
 _HEAD, _ITEMS = object.__basicsize__ // _WORD, tuple.__basicsize__ // _WORD
 _DATA, _SHAPE, _STRIDES = _HEAD, _HEAD + 2, _HEAD + 3
-# To hand on so many numbers takes LLVM a fifth of the first call of balls in a union of three parts.
+# Passing this many numbers takes LLVM a fifth of the first call of balls in a union of three parts.
 _MANY = 400
 _THING, _INDEX = ir.IntType(8).as_pointer(), ir.IntType(8 * _WORD)
 
 
 class _Parts(NamedTuple):
-    """A tuple or the fields of an array, of which a kernel takes each part as an argument."""
+    """A tuple or the fields of an array, each part of which is an argument of the kernel."""
 
     parts: tuple[Any, ...]
 
 
 class CallWrapper(PyCallWrapper):  # type: ignore[misc]
-    """What Python calls of a kernel."""
+    """The function of a kernel that Python calls."""
 
     def build_wrapper(self, api: Any, builder: Any, *given: Any) -> None:
-        """Numba's instructions but for what can be read."""
+        """Emit Numba's instructions, except for the arguments that can be read."""
         take, unbox = builder.extract_value, api.to_native_value
 
         def part(of: Any, place: Any, **named: Any) -> Any:
@@ -77,7 +77,7 @@ def _loaded(builder: Any, thing: Any, place: int, kind: Any = _THING) -> Any:
 
 
 def wrap(context: Any, library: Any, described: Any, environment: Any, call_helper: Any, release_gil: bool) -> None:
-    """Add to a library what Python calls of a function: `create_cpython_wrapper` of a target of Numba."""
+    """Add to a library the function that Python calls: `create_cpython_wrapper` of a target of Numba."""
     module = context.create_module("wrapper")
     kind = context.call_conv.get_function_type(described.restype, described.argtypes)
     function = ir.Function(module, kind, described.llvm_func_name)

@@ -1,6 +1,6 @@
-"""Compiled kernels on disk: their folder, whether a kernel is there, and reports of compilations.
+"""Compiled kernels on disk: their folder, whether a kernel is compiled, and reports of compilations.
 
-What makes and finds them is in `machine_code.py`, which imports the compiler.
+`machine_code.py` makes and finds them, and imports the compiler.
 """
 
 import contextlib
@@ -20,19 +20,19 @@ from .deferred import compiler
 _SETTINGS = ".numba_config.yaml"
 _COMPILING = "compiling a kernel, once: {}"
 _LOG = logging.getLogger("swarm")
-# A compilation that takes longer [s] is a warning, for not every run shows what is compiled.
+# A compilation that takes longer [s] gives a warning, as not every run shows its compilations.
 LONG = 10.0
 _SLOW = f"it takes more than {LONG:g} s so far"
 
 
 def base() -> Path:
-    """Folder of all that is kept between processes: $NUMBA_CACHE_DIR or $XDG_CACHE_HOME or ~/.cache."""
+    """Return the folder of all files kept between processes: $NUMBA_CACHE_DIR or $XDG_CACHE_HOME or ~/.cache."""
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(os.environ.get("NUMBA_CACHE_DIR") or Path(home) / "swarm")
 
 
 def is_disabled() -> bool:
-    """Whether the compiler is switched off for this process."""
+    """Whether the compiler is disabled in this process."""
     if "numba" not in sys.modules and not os.path.exists(_SETTINGS):
         return os.environ.get("NUMBA_DISABLE_JIT", "0").strip() not in ("", "0")
     import numba
@@ -41,19 +41,19 @@ def is_disabled() -> bool:
 
 
 def in_python(kernel: Any) -> Any:
-    """The function that a kernel is compiled from."""
+    """Return the Python function of a kernel."""
     return getattr(kernel, "py_func", kernel)
 
 
 def kind(kernel: Any, arguments: tuple[Any, ...]) -> str:
-    """A name for what a kernel is compiled for."""
+    """Return a name for the types that a kernel is compiled for."""
     return str(compiler().kind_of(in_python(kernel), arguments))
 
 
 def is_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:
     """Whether a kernel is compiled for such arguments, in this process or on disk.
 
-    Numba has no function for it. Its own search initialises the compiler, 0.2 s in each process; a look into its index
+    Numba has no function for this. Its own search initialises the compiler, 0.2 s in each process; a look at its index
     takes a millisecond.
     """
     if in_python(kernel) is kernel:
@@ -65,10 +65,10 @@ def is_compiled(kernel: Any, arguments: tuple[Any, ...]) -> bool:
 
 
 class Spent:
-    """The time that went into kernels.
+    """The time spent on kernels.
 
     Attributes:
-        seconds: of wall time.
+        seconds: wall time.
         latest: when the latest of them began and ended [s of time.monotonic].
     """
 
@@ -78,11 +78,11 @@ class Spent:
 
 
 class Listener:
-    """What happens at the beginning and at the end of a compilation of any function.
+    """A listener for the beginning and the end of each compilation of a function.
 
     Args:
-        tell: is given a sentence about each kernel.
-        sentence: makes it of the kernel; None: its name.
+        tell: called with a sentence about each kernel.
+        sentence: makes the sentence from the kernel; None: the name of the kernel.
         why: why a compilation may take long, or "".
     """
 
@@ -93,7 +93,7 @@ class Listener:
         self.spent = Spent()
 
     def begins(self, function: Any, is_kernel: bool) -> None:
-        """A compilation begins."""
+        """Report that a compilation begins."""
         self._begun.append(time.monotonic())
         if is_kernel:
             message = _COMPILING.format(function.__name__) if self._sentence is None else self._sentence(function)
@@ -105,11 +105,11 @@ class Listener:
             self._timer.start()
 
     def ends(self) -> None:
-        """A compilation ends."""
+        """Report that a compilation ends."""
         if not self._begun:
-            return  # of one that began before this context
+            return  # the compilation began before this context
         first = self._begun.pop()
-        # One that is compiled within another is counted there.
+        # A compilation within another one is counted there.
         if not self._begun:
             self._end_timer()
             self.spent.latest = first, time.monotonic()
@@ -121,7 +121,7 @@ class Listener:
             self._timer = None
 
 
-# Of the contexts that are open: the compiler tells each of them.
+# The listeners of the open contexts: the compiler calls each of them.
 listeners: list[Listener] = []
 
 
@@ -129,7 +129,7 @@ listeners: list[Listener] = []
 def kernels_compiled(
     tell: Callable[[str], None], sentence: Callable[[Any], str] | None = None, why: str = ""
 ) -> Iterator[Spent]:
-    """Report every kernel that is compiled in this context to the logger and to `tell`: the arguments of `Listener`."""
+    """Report every kernel that is compiled in this context to the logger and to `tell`; arguments as in `Listener`."""
     one = Listener(tell, sentence, why)
     listeners.append(one)
     try:

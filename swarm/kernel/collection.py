@@ -1,4 +1,4 @@
-"""The garbage collector of Python, which rests at times."""
+"""Python's garbage collector, disabled at times."""
 
 import contextlib
 import gc
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def uncollected() -> Iterator[None]:
-    """Collect nothing meanwhile, and go on afterwards as before."""
+    """Disable the garbage collector in a context, and restore its state afterwards."""
     collects = gc.isenabled()
     gc.disable()
     try:

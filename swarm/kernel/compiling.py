@@ -1,11 +1,11 @@
-"""Names of what is compiled, in plain words: the kernel of what, and which of how many that the run needs."""
+"""Names of kernels in plain words, and the number of a kernel among those that the run needs."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
 
 from . import cache
 
-# What each kernel computes, in words for users.
+# The result of each kernel, in words for users.
 _WORDS = {
     "advance_block": "flights and impacts",
     "slide_block": "sliding",
@@ -44,7 +44,7 @@ class Compilations:
     """The kernels that are compiled for a run.
 
     Attributes:
-        calls: every kernel that the run is known to need, with its arguments; the run sets it.
+        calls: returns every kernel that the run is known to need, with its arguments; the run sets it.
     """
 
     def __init__(self) -> None:
@@ -52,14 +52,14 @@ class Compilations:
         self._begun = 0
 
     def sentence(self, kernel: Any) -> str:
-        """The sentence before a kernel is compiled. What slides or rests on the way needs more of them."""
+        """Return the sentence before a kernel is compiled. Particles that slide or rest need further kernels."""
         left = sum(not cache.is_compiled(*call) for call in self.calls())
         self._begun += 1
         return sentence_of(kernel, f" ({self._begun} of {self._begun - 1 + max(1, left)})")
 
 
 def sentence_of(kernel: Any, number: str = "") -> str:
-    """The sentence before a kernel is compiled, with its number among those that a run needs."""
+    """Return the sentence before a kernel is compiled, with its number among those that a run needs."""
     name = kernel.__name__
     words = f"the kernel of {_WORDS[name]}" if name in _WORDS else f"the kernel {name}"
     return f"compiling {words}{number} for this kind of scene, once"

@@ -1,6 +1,6 @@
-"""What the compiler registers when it is first needed, and not before: a run of few particles needs no compiler.
+"""Actions that wait until the compiler is first needed: a run of few particles needs no compiler.
 
-To import Numba, LLVM and the trace, and to load a kernel, takes 0.6 s of processor time, more than such a run.
+Importing Numba, LLVM and the trace and loading a kernel takes 0.6 s of processor time, more than such a run.
 """
 
 import gc
@@ -17,17 +17,17 @@ _loaded: list[Any] = []
 
 
 def defer(action: Callable[[Any], Any]) -> None:
-    """Do something with the module `machine_code` when it is loaded, now if it is."""
+    """Call `action` with the module `machine_code` when it is loaded, at once if it is."""
     _waiting.append(action)
     if _loaded:
         _do_all()
 
 
 def compiler() -> Any:
-    """The module `machine_code`, which the first call imports.
+    """Return the module `machine_code`; the first call imports it.
 
-    Nothing is collected meanwhile. If the imports of the process are frozen, as a command freezes its own, these are
-    too: to look through what Numba makes takes 0.1 s and finds nothing.
+    The garbage collector is disabled meanwhile. If the imports of the process are frozen, as a command freezes its own,
+    these are too: a collection through Numba's objects takes 0.1 s and finds nothing.
     """
     if is_loaded():
         return importlib.import_module(".machine_code", __package__)
@@ -44,7 +44,7 @@ def is_loaded() -> bool:
 
 
 def loaded(machine_code: Any) -> None:
-    """Do all that was deferred; `machine_code` calls it with itself when it is complete."""
+    """Run all deferred actions; `machine_code` calls this with itself when it is complete."""
     _loaded.append(machine_code)
     _do_all()
 

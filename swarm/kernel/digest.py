@@ -1,9 +1,9 @@
-"""The key of the code of a kernel: a digest of all of this package that it may trace.
+"""The key of the code of a kernel: a digest of all code of this package that the kernel may trace.
 
-Numba's own cache looks at the file of the compiled function only, so after an edit in another file it would return the
-old code. A key of all files would discard every kernel at any edit. This one follows what a kernel refers to, from
+Numba's own cache checks only the file of the compiled function, so after an edit in another file it would return the
+old code. A key of all files would discard every kernel at any edit. This key follows the references of a kernel, from
 function to function and from class to base class, which takes 0.3 s; so it is kept on disk, under a digest of the text
-of the package, and a warm call only reads that.
+of the package, and a warm call reads only this file.
 """
 
 import contextlib
@@ -22,12 +22,12 @@ _STARTED = time.time()
 
 
 def key_of_kernel(function: Any, kinds: Sequence[Any], others: tuple[Any, ...], kept: Path) -> Key:
-    """The key of a kernel.
+    """Return the key of a kernel.
 
     Args:
-        function: what is compiled.
+        function: the function that is compiled.
         kinds: the Numba types of its arguments.
-        others: what else tells two kernels apart.
+        others: all else that distinguishes two kernels.
         kept: the folder where digests are kept.
 
     Returns:
@@ -35,7 +35,7 @@ def key_of_kernel(function: Any, kinds: Sequence[Any], others: tuple[Any, ...], 
     """
     names = _names_of(function, kinds, others)
     known = kept / f"{names.text}{text_of_package()}"
-    # Another text than that which this process runs says nothing about its code.
+    # A text other than that which this process runs does not describe its code.
     is_text = names.repeats and is_package_as_imported()
     if is_text:
         with contextlib.suppress(OSError):
@@ -47,7 +47,7 @@ def key_of_kernel(function: Any, kinds: Sequence[Any], others: tuple[Any, ...], 
 
 
 def was_compiled(function: Any, kinds: Sequence[Any], others: tuple[Any, ...], kept: Path) -> bool:
-    """Whether a kernel of these names was compiled before, of whatever code: else it needs no key to be missed."""
+    """Whether a kernel of these names was compiled before, with any code; if not, its key need not be computed."""
     return any(kept.glob(f"{_names_of(function, kinds, others).text}*"))
 
 
@@ -66,7 +66,7 @@ def _write(known: Path, text: str) -> None:
 
 @functools.cache
 def text_of_package() -> str:
-    """A digest of the text of all modules of this package."""
+    """Return a digest of the text of all modules of this package."""
     found = hashlib.sha256()
     for path in _files():
         text = Path(path).read_bytes()
@@ -75,7 +75,7 @@ def text_of_package() -> str:
 
 
 def is_package_as_imported() -> bool:
-    """Whether no module of this package has changed since this process imported the first."""
+    """Whether no module of this package has changed since this process imported the first one."""
     changed = (max(found.st_mtime, found.st_ctime) for found in map(os.stat, _files()))
     return max(changed) < _STARTED
 

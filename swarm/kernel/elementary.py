@@ -1,7 +1,7 @@
-"""Elementary functions of sums, products and one quotient: those of a library end a lane loop.
+"""Elementary functions from sums, products and one quotient: calls of a library would end a lane loop.
 
-The errors of exponentials and logarithms are below 2 ulp, of powers up to 8 too. In Python they take arrays too, of
-which NumPy computes them.
+The errors of exponentials and logarithms are below 2 ulp, also of powers up to 8. In Python the functions also take
+arrays, for which they call NumPy.
 """
 
 import math
@@ -11,10 +11,10 @@ import numpy as np
 
 from .jit import allocating, select
 
-# The sum with it, less it again, is the nearest whole number.
+# Adding and subtracting it rounds to the nearest whole number.
 _WHOLE = 1.5 * 2.0**52
 # pi in three parts, of which the first two leave room for a whole number of 25 bits: up to 1e8 rad their product with
-# it is exact. Beyond, the error is that of the rounding of the angle.
+# it is exact. Beyond, the error is that of rounding the angle.
 _PI = (3.141592651605606, 1.9841871479187034e-09, 1.1442377452219664e-17)
 _INVERSE_PI = 0.3183098861837907
 # The minimax polynomials of fdlibm on |y| <= pi/4: (sin y - y)/y^3 and (cos y - 1 + y^2/2)/y^4 in powers of y^2
@@ -29,43 +29,43 @@ _COSINE = (
 _INVERSE_LN2 = 1.4426950408889634
 # ln 2 in two parts: the first has 32 bits, so that its product with an exponent is exact.
 _LN2_HIGH, _LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
-# From here to there the power of 2 in e^a has a normal number; beyond, e^a counts as 0 or as infinite.
+# Between these the power of 2 in e^a is a normal number; beyond them e^a counts as 0 or as infinite.
 _LEAST, _MOST = -708.0, 709.0
-# 1 - y coth(y/2)/2 and its like in powers of y^2: the minimax polynomial of fdlibm on |y| <= ln(2)/2
+# 1 - y coth(y/2)/2 and similar in powers of y^2: the minimax polynomial of fdlibm on |y| <= ln(2)/2
 _EXPONENTIAL = (
     4.13813679705723846039e-08, -1.65339022054652515390e-06, 6.61375632143793436117e-05,
     -2.77777777770155933842e-03, 1.66666666666666019037e-01,
 )  # fmt: skip
-# 2/3, 2/5, ...: of 2 artanh(s) less its first term, from the last.
+# 2/3, 2/5, ...: the terms of 2 artanh(s) after the first, in reverse order.
 _ARTANH = tuple(2.0 / n for n in range(21, 1, -2))
 _HALF_ROOT = 0.7071067811865476  # sqrt(1/2)
 _POWERS = tuple(1 << k for k in range(9, -1, -1))
-# 2^27 + 1, by which a number of 53 bits is cut in halves.
+# 2^27 + 1, which splits a number of 53 bits into halves.
 _SPLITS = 134217729.0
-# Where tanh is 1 but for round-off.
+# Beyond it tanh is 1 to round-off.
 _FLAT = 40.0
 
 
 def sine_and_versine(angle):
-    """(sin a, 1 - cos a), the second without cancellation."""
+    """Return (sin a, 1 - cos a), the second without cancellation."""
     return sine_and_versine_of(*reduced(angle))
 
 
 def sine_and_versine_of(y, odd):
-    """The same of a `reduced` angle."""
+    """Return (sin a, 1 - cos a) of a `reduced` angle."""
     return _doubled(odd, *_of_half(y))
 
 
 def _doubled(odd, sine, cosine):
-    """(sin a, 1 - cos a) from (sin y, cos y) of a `reduced` angle."""
-    # sin a = +-2 sin y cos y and 1 - cos a = 2 sin^2 y where n is even, 2 cos^2 y where it is odd
+    """Return (sin a, 1 - cos a) from (sin y, cos y) of a `reduced` angle."""
+    # sin a = +-2 sin y cos y and 1 - cos a = 2 sin^2 y if n is even, 2 cos^2 y if it is odd
     is_odd = odd != 0.0
     twice, one = 2.0 * (sine * cosine), select(is_odd, cosine, sine)
     return select(is_odd, -twice, twice), 2.0 * (one * one)
 
 
 def nearly_sine_and_versine_of(y, odd):
-    """The same with an error of some 1e-7, for a guess: half the operations."""
+    """Return (sin a, 1 - cos a) with an error of about 1e-7, for a guess: half the operations."""
     z = y * y
     sine = y + (y * z) * (-1.0 / 6.0 + z * (1.0 / 120.0 - z * (1.0 / 5040.0)))
     cosine = 1.0 - z * (0.5 - z * (1.0 / 24.0 - z * (1.0 / 720.0 - z * (1.0 / 40320.0))))
@@ -73,7 +73,7 @@ def nearly_sine_and_versine_of(y, odd):
 
 
 def sine_and_cosine(angle):
-    """(sin a, cos a), each with an error of 2 ulp of 1; in Python also of arrays."""
+    """Return (sin a, cos a), each with an error of 2 ulp of 1; in Python also for arrays."""
     y, odd = reduced(angle)
     sine, cosine = _of_half(y)
     sign = 1.0 - 4.0 * abs(odd)
@@ -81,13 +81,13 @@ def sine_and_cosine(angle):
 
 
 def reduced(angle):
-    """y of an angle a = n pi + 2 y, and +-1/2 where n is odd, 0 where it is even."""
+    """Return y of an angle a = n pi + 2 y, and +-1/2 if n is odd, 0 if it is even."""
     n = (angle * _INVERSE_PI + _WHOLE) - _WHOLE
     return 0.5 * (((angle - n * _PI[0]) - n * _PI[1]) - n * _PI[2]), _odd(n)
 
 
 def _of_half(y):
-    """(sin y, cos y) for |y| up to pi/4."""
+    """Return (sin y, cos y) for |y| up to pi/4."""
     z = y * y
     a, b, c, d, e, f = _SINE
     sine = y + (y * z) * (a + z * (b + z * (c + z * (d + z * (e + z * f)))))
@@ -96,13 +96,13 @@ def _of_half(y):
 
 
 def _odd(n):
-    """+-1/2 of an odd number, 0 of an even one."""
+    """Return +-1/2 for an odd number, 0 for an even one."""
     half = 0.5 * n
     return (half + _WHOLE) - _WHOLE - half
 
 
 def _split(a):
-    """(2^n, e^y - 1) for a = n ln 2 + y."""
+    """Return (2^n, e^y - 1) for a = n ln 2 + y."""
     n = (a * _INVERSE_LN2 + _WHOLE) - _WHOLE
     high, low = a - n * _LN2_HIGH, n * _LN2_LOW
     y = high - low
@@ -126,7 +126,7 @@ def _exponential(a):
 
 
 def _less_one(a):
-    """e^a - 1 without cancellation, for a from 0 to 709, and from -40 on."""
+    """Return e^a - 1 without cancellation, for a from -40 to 709."""
     power, rest = _split(a)
     return power * rest + (power - 1.0)
 
@@ -156,7 +156,7 @@ def _logarithm(u):
 
 
 def _scaled(u):
-    """(v, e) with u = 2^e v, v between 1/2 and 1."""
+    """Return (v, e) with u = 2^e v, v between 1/2 and 1."""
     is_large, e, left = u >= 1.0, 0.0, u
     for k in _POWERS:
         moved = left * select(is_large, 2.0**-k, 2.0**k)
@@ -166,16 +166,16 @@ def _scaled(u):
 
 
 def logarithm_of(u, e):
-    """ln(2^e u) for u in [1/2, 1], to one unit in the last place."""
+    """Return ln(2^e u) for u in [1/2, 1], to one unit in the last place."""
     e, f, less = _near_one(u, e)
     return e * _LN2_HIGH - ((less - e * _LN2_LOW) - f)
 
 
 def _near_one(u, e):
-    """(k, f, f - ln(1 + f)) for 2^e u = 2^k (1 + f) with 1 + f within sqrt(1/2)..sqrt(2).
+    """Return (k, f, f - ln(1 + f)) for 2^e u = 2^k (1 + f) with 1 + f within sqrt(1/2)..sqrt(2).
 
     ln(1 + f) = 2 artanh(s) for s = f/(2 + f): with 2 s = f - s f that is f - s (f - R), R = 2 s^2/3 + 2 s^4/5 + ...,
-    |s| < 0.172; its rounding is small beside f. What is left out is 2 s^22/23 < 2e-18 of R.
+    |s| < 0.172; its rounding is small beside f. The neglected terms are 2 s^22/23 < 2e-18 of R.
     """
     small = u < _HALF_ROOT
     f, e = select(small, u + u, u) - 1.0, select(small, e - 1.0, e)
@@ -203,14 +203,14 @@ def _power(u, c):
 
 
 def _halves(a):
-    """Two numbers of 26 bits with the sum a (Veltkamp): their products are exact."""
+    """Return two numbers of 26 bits with the sum a (Veltkamp): their products are exact."""
     moved = _SPLITS * a
     high = moved - (moved - a)
     return high, a - high
 
 
 def _of_numbers(of_one: Any, of_arrays: Any, meaning: str) -> Any:
-    """A function of a number, which in Python takes arrays too."""
+    """Return a function of a number, which in Python also takes arrays."""
 
     def in_python(a, *more):
         return of_one(a, *more) if np.ndim(a) == 0 else of_arrays(a, *more)

@@ -1,4 +1,4 @@
-"""Instructions of operations of kernels that `arrays.py`, `fours.py`, `lines.py` and `vector.py` define in Python."""
+"""Instructions of the operations that `arrays.py`, `fours.py`, `lines.py` and `vector.py` define in Python."""
 
 import functools
 import math
@@ -23,7 +23,7 @@ from .vector import Vec
 
 
 def emit_spaced(known: Any, stride: int) -> None:
-    """Those of a function that `spaced` returned."""
+    """Emit the instructions of a function that `spaced` returned."""
 
     @operation(known, lambda tables: tables, types.BaseNamedTuple)
     def _emit_tables(context, builder, signature, args):
@@ -44,7 +44,7 @@ def _type_of_scratch(shape, dtype):
 
 
 def _part(builder: Any, made: Any, k: int) -> Any:
-    """A part of a tuple, as the constant that it was made of where it is one."""
+    """Return a part of a tuple, as the constant that it was made of if it is one."""
     while isinstance(made, InsertValue):
         if made.indices == [k]:
             return made.value
@@ -58,7 +58,7 @@ def _on_stack(zeros: bool, context: Any, builder: Any, signature: Any, args: Any
     number = context.get_data_type(kind.dtype)
     item = context.get_constant(types.intp, context.get_abi_sizeof(number))
     if all(isinstance(one, Constant) for one in shape):
-        # Where a function begins: what a loop asks for in each of its rounds is the same.
+        # At the beginning of the function: all rounds of a loop use the same array.
         size = context.get_constant(types.intp, math.prod(one.constant for one in shape))
         with builder.goto_entry_block():
             data = builder.alloca(number, size)
@@ -109,7 +109,7 @@ def _emit_fetch(context, builder, signature, args):
     number, pointer = ir.IntType(32), cgutils.voidptr_t
     kind = ir.FunctionType(ir.VoidType(), [pointer, number, number, number])
     ask = builder.module.declare_intrinsic("llvm.prefetch", [pointer], kind)
-    # To read, of use for long, data
+    # For reading, of long use, data
     builder.call(ask, [place, number(0), number(3), number(1)])
     return context.get_dummy_value()
 
@@ -167,9 +167,9 @@ _KIND = types.NamedUniTuple(types.float64, 3, Vec)
 
 
 def _emitted(symbol: Any, instruction: str, first: Any, second: Any) -> None:
-    """Let kernels do this operator component by component: no function of its own for the compiler.
+    """Let kernels apply this operator component by component, without a function of its own for the compiler.
 
-    As overloads of the operators they cost up to a tenth of the time to compile.
+    Overloads of the operators cost up to a tenth of the compile time.
     """
     vectors = [kind is types.BaseNamedTuple for kind in (first, second)]
 
@@ -206,14 +206,14 @@ def _shuffled(builder, pair, places):
 
 
 def _pointer(context, builder, kind, table, row, column, columns, to):
-    """That of the numbers in a row of so many columns from one on; row and column are of the type of an index."""
+    """Return the pointer of the numbers from (row, column) on, in a table of `columns` columns; both are indices."""
     data = context.make_array(kind)(context, builder, table).data
     place = builder.add(builder.mul(row, row.type(columns)), column)
     return builder.bitcast(builder.gep(data, [place]), to.as_pointer())
 
 
 def _pointers(context, builder, kinds, given):
-    """Those of the tile, of the table, and of the rows for its lanes, from arrays and places in them."""
+    """Return the pointers of the tile, of the table, and of the rows for its lanes, from arrays and places in them."""
     tile, q, table, column, ends, e = given
     none = q.type(0)
     return [
@@ -228,7 +228,7 @@ def _indices(context, builder, signature, args, places):
 
 
 def _function(module, name, arguments, body):
-    """A function of its own for all calls in a kernel: written out in each of them the kernel takes a third longer."""
+    """Return a function for all calls in a kernel: written out in each of them the kernel takes a third longer."""
     if name not in module.globals:
         made = ir.Function(module, ir.FunctionType(ir.VoidType(), arguments), name)
         made.linkage = "internal"
@@ -240,13 +240,13 @@ def _function(module, name, arguments, body):
 
 
 def _row(builder, table, ends, lane, to):
-    """The pointer of a row of the table for a lane, which is a number of 64 bits."""
+    """Return the pointer of a row of the table for a lane, which is a number of 64 bits."""
     row = builder.zext(builder.load(builder.gep(ends, [lane])), _WHOLE)
     return builder.bitcast(builder.gep(table, [builder.mul(row, _WHOLE(COLUMNS))]), to.as_pointer())
 
 
 def _column(builder, tile, c):
-    """The pointer of a column of all lanes."""
+    """Return the pointer of a column of all lanes."""
     return builder.bitcast(builder.gep(tile, [_WHOLE(c * LANES)]), _EIGHT.as_pointer())
 
 
@@ -267,7 +267,7 @@ def _emit_into_lanes(context, builder, signature, args):
 
 def _into_lanes(builder, tile, table, ends):
     lines = [builder.load(_row(builder, table, ends, _WHOLE(lane), _FOUR), align=8) for lane in range(LANES)]
-    # Numbers of two lanes beside one another by each instruction, which works on halves of a quarter of a vector.
+    # Each instruction joins the numbers of two lanes, and works on halves of a quarter of a vector.
     halves = [_shuffled(builder, (lines[k], lines[k + 2]), range(8)) for k in (0, 1, 4, 5)]
     low = [_shuffled(builder, halves[k : k + 2], (0, 8, 2, 10, 4, 12, 6, 14)) for k in (0, 2)]
     high = [_shuffled(builder, halves[k : k + 2], (1, 9, 3, 11, 5, 13, 7, 15)) for k in (0, 2)]
@@ -281,7 +281,7 @@ def _into_lanes(builder, tile, table, ends):
 
 
 def _of_lanes(builder, tile, end):
-    """Of each lane the four numbers of an end."""
+    """Return the four numbers of an end, for each lane."""
     columns = [builder.load(_column(builder, tile, end * FOUR + c), align=8) for c in range(FOUR)]
     low = [_shuffled(builder, columns[k : k + 2], (0, 8, 2, 10, 4, 12, 6, 14)) for k in (0, 2)]
     high = [_shuffled(builder, columns[k : k + 2], (1, 9, 3, 11, 5, 13, 7, 15)) for k in (0, 2)]
@@ -293,7 +293,7 @@ def _of_lanes(builder, tile, end):
 
 
 def _from_lanes(of_one, count, builder, tile, table, ends, lanes):
-    """Give `of_one` the place of each end in the table, and what is for it; of each lane so many ends."""
+    """Call `of_one` with the place of each end in the table and its numbers; each lane has `count` ends."""
     every = _WHOLE(2**LANES - 1)
     with builder.if_else(builder.icmp_unsigned("==", builder.and_(lanes, every), every)) as (all_lanes, some_lanes):
         with all_lanes:

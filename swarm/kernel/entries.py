@@ -1,10 +1,10 @@
 """The keys of compiled kernels on disk, and their files.
 
 Numba finds a kernel by the types of its arguments, which it pickles in an index with the classes of tuples. A class of
-a module is pickled by its name: a process that cannot import that module cannot read the index. A class of a script or
+a module is pickled by its name: a process that cannot import this module cannot read the index. A class of a script or
 of a cell of a notebook is pickled by its value, which no other process takes for its own. Here a text stands for the
-types: the names of classes, and the code of what is defined for them outside of this package. In a kernel itself
-classes are numbers, so that the process that loads it has its own in their place.
+types: the names of classes, and the code of their definitions outside of this package. In a kernel itself
+classes are numbers, so that the process that loads it uses its own classes.
 """
 
 import io
@@ -20,7 +20,7 @@ from .frozen import Frozen
 
 
 class Key(NamedTuple):
-    """A text for the types of arguments, the classes of tuples in them, in its order, and whether it comes again."""
+    """A text for the types of arguments, the classes of tuples in them, in order, and whether the key repeats."""
 
     text: str
     classes: tuple[type, ...]
@@ -28,10 +28,10 @@ class Key(NamedTuple):
 
 
 def key_of(kinds: Sequence[Any], *others: Any, package: str | None = None) -> Key:
-    """The key of Numba types, and of what else tells two kernels apart: plain values and functions.
+    """Return the key of Numba types, and of all else that distinguishes two kernels: plain values and functions.
 
-    It never repeats where a function, or what is defined for a class, refers to what is not known. With `package` it
-    holds the code of this package too that the functions and classes refer to, see `Frozen`.
+    It never repeats if a function, or the definition of a class, refers to an unknown value. With `package` the key
+    includes the code of this package to which the functions and classes refer, see `Frozen`.
     """
     frozen, classes = Frozen(package=package), dict[type, None]()
     frozen.value(others)
@@ -53,7 +53,7 @@ def _add(kind: Any, frozen: Frozen, classes: dict[type, None]) -> None:
 
 
 def python_class(kind: Any) -> Any:
-    """The Python class of the values that the Numba type `kind` describes, as far as functions are chosen by it."""
+    """Return the Python class of the values of the Numba type `kind`, as far as functions are chosen by it."""
     if isinstance(kind, types.BaseTuple):
         return getattr(kind, "instance_class", tuple)
     if isinstance(kind, types.NoneType):
@@ -62,7 +62,7 @@ def python_class(kind: Any) -> Any:
 
 
 def is_own(function: Any) -> bool:
-    """Whether a function is one of this package, by the code of which the folder of kernels is named."""
+    """Whether a function belongs to this package; the folder of kernels is named by the package's code."""
     return str(function.__module__).partition(".")[0] == __name__.partition(".")[0]
 
 
@@ -70,7 +70,7 @@ class File(IndexDataCacheFile):  # type: ignore[misc]
     """The index and the kernels of one function, by `Key`."""
 
     def save(self, key: Key, data: Any) -> None:
-        """Write a kernel that can be found again."""
+        """Write a kernel with a key that repeats."""
         if not key.repeats:
             return
         written = io.BytesIO()
@@ -78,7 +78,7 @@ class File(IndexDataCacheFile):  # type: ignore[misc]
         super().save(key.text, written.getvalue())
 
     def load(self, key: Key) -> Any:
-        """A kernel, or None."""
+        """Return a kernel, or None."""
         written = super().load(key.text)
         return None if written is None else _EntryReader(io.BytesIO(written), key.classes).load()
 
@@ -89,7 +89,7 @@ class _EntryWriter(NumbaPickler):  # type: ignore[misc]
         self._numbers = {made: number for number, made in enumerate(classes)}
 
     def persistent_id(self, thing: Any) -> int | None:
-        """The number of a class."""
+        """Return the number of a class."""
         return self._numbers.get(thing) if isinstance(thing, type) else None
 
 
@@ -99,5 +99,5 @@ class _EntryReader(pickle.Unpickler):
         self._classes = classes
 
     def persistent_load(self, number: int) -> type:
-        """The class of a number."""
+        """Return the class of a number."""
         return self._classes[number]

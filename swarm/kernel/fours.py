@@ -1,6 +1,6 @@
-"""Sums over blocks of 4 x 4 x 4 numbers of a table, four at a time: the vector instructions that LLVM does not find.
+"""Sums over blocks of 4 x 4 x 4 numbers of a table, four at a time, by vector instructions that LLVM does not find.
 
-It makes vectors of loops, not of what is written out, and a loop over four it writes out first.
+LLVM makes vectors of loops, not of expressions that are written out, and it first writes out a loop over four.
 """
 
 from typing import Any, NamedTuple
@@ -9,7 +9,7 @@ import numpy as np
 
 
 class Four(NamedTuple):
-    """Four numbers that go with four others, such as weights."""
+    """Four numbers, each for one of four others, such as weights."""
 
     a: Any
     b: Any
@@ -18,12 +18,12 @@ class Four(NamedTuple):
 
 
 def sum_of(w, c):
-    """The sum of the products."""
+    """Return the sum of the products."""
     return (w.a * c.a + w.b * c.b) + (w.c * c.c + w.d * c.d)
 
 
 def over_block(table: Any, place: Any, x: Any, y: Any) -> Four:
-    """Along the third axis, the sums with the weights x and y over the first two, of the block that begins at a place.
+    """Return, along the third axis, the sums over the first two with the weights x and y, of the block at a place.
 
     The place is a NamedTuple that begins with three indices; in plain Python these may be arrays.
     """

@@ -1,6 +1,6 @@
-"""A function, frozen: a copy of it and of all it refers to, and a digest of them; likewise a class.
+"""Frozen functions and classes: a copy with all that they refer to, and a digest of it.
 
-The copy of a user's function is compiled, so what the cache has under a digest is the code that was digested: after an
+The copy of a user's function is compiled, so the cache has under a digest exactly the code that was digested: after an
 edit anywhere, or when a global changes, the digest differs. Functions of this package are digested, not copied.
 """
 
@@ -23,7 +23,7 @@ import numpy as np
 
 Function = Callable[..., Any]
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), range)
-# Modules that are known by their version; any other is known by what the function takes from it.
+# Modules that are identified by their version; others are identified by the parts that the function uses.
 _PYTHON = ".".join(map(str, sys.version_info[:3]))
 _VERSIONS = {**dict.fromkeys(sys.stdlib_module_names, _PYTHON), "numpy": np.__version__}
 _KNOWN = {*_VERSIONS, "numba"}
@@ -33,20 +33,20 @@ _CODE = operator.attrgetter(
     "co_kwonlyargcount", "co_posonlyargcount",
 )  # fmt: skip
 _CONSTANTS, _LOAD_GLOBAL, _LOAD_NAME = frozenset(dis.hasconst), dis.opmap["LOAD_GLOBAL"], dis.opmap["LOAD_NAME"]
-# Other classes that functions are chosen by.
+# Other classes by which functions are chosen.
 _DISPATCHED = (type(None), float, object)
 
 
-# What a named tuple has, and the modules that Python says its functions are of.
+# The attributes of a named tuple, and the modules that Python gives for its functions.
 _NAMED_TUPLE = dir(collections.namedtuple("_NAMED_TUPLE", ()))
 _NAMED_TUPLES = ("collections", "namedtuple_")
 _ONE: Any = collections.namedtuple("_ONE", "field")
-# Fields and slots of a class, which are in its `_fields`.
+# The fields and slots of a class, which are in its `_fields`.
 _DESCRIPTORS = (types.MemberDescriptorType, types.GetSetDescriptorType, type(_ONE.field))
 
 
 def _version_of(root: str) -> str:
-    """The version of a top module, or nothing of this package."""
+    """Return the version of a top module, or nothing for this package."""
     return version(root) if root == "numba" else _VERSIONS.get(root, "")
 
 
@@ -55,7 +55,7 @@ class Frozen:
 
     Args:
         prepared: makes a copy callable in kernels, if needed.
-        package: what stands for objects of this package with an unknown value; None: all of this package is known by
+        package: stands for objects of this package with an unknown value; None: all of this package is identified by
             its names.
     """
 
@@ -65,15 +65,16 @@ class Frozen:
         self._prepared, self._package = prepared, package
         self._hash = hashlib.sha256()
         self._copies: dict[Function, Function] = {}
+        self._numbers: dict[Function, int] = {}
         self._classes: list[type] = []
         self.is_known = True
 
     def digest(self) -> str:
-        """16 hexadecimal digits of what was frozen so far."""
+        """Return 16 hexadecimal digits for all that was frozen so far."""
         return self._hash.hexdigest()[:16]
 
     def function(self, function: Function) -> Function:
-        """A copy of a function."""
+        """Return a copy of a function."""
         function = getattr(function, "py_func", function)
         assert isinstance(function, types.FunctionType)
         own = _is_own(function)
@@ -81,8 +82,9 @@ class Frozen:
             self.function(function.in_kernels)
             return function
         if function in self._copies:
-            self.add("again", list(self._copies).index(function))
+            self.add("again", self._numbers[function])
             return self._copies[function]
+        self._numbers[function] = len(self._numbers)
         code = function.__code__
         # Numba looks up the module of a function by this name when it loads a kernel.
         scope: dict[str, Any] = {"__name__": __name__, "__builtins__": builtins}
@@ -106,12 +108,12 @@ class Frozen:
         return function if own else self._prepared(copy)
 
     def value(self, value: Any, code: types.CodeType | None = None, own: bool = False) -> Any:
-        """A copy of what a function refers to.
+        """Return a copy of a value that a function refers to.
 
         Args:
             value: any object.
-            code: which names of a module count; None: a module is not known.
-            own: whether it is code of this package that refers to it.
+            code: the code with the names of a module that count; None: a module is unknown.
+            own: whether code of this package refers to it.
         """
         if type(value) in _PLAIN or isinstance(value, np.generic):
             self.add(type(value).__name__, value)
@@ -140,19 +142,19 @@ class Frozen:
         return value
 
     def _object(self, value: Any, code: types.CodeType | None, own: bool) -> None:
-        """Any other object: one that code of this package refers to by its class and its attributes."""
+        """Add any other object: code of this package refers to it by its class and its attributes."""
         if own and _is_own(type(value)) and hasattr(value, "__dict__"):
             self._class(type(value))
             self.value(tuple(sorted(vars(value).items())), code, own)
         elif own and self._package:
             self.add("package", self._package)
         else:
-            # Nothing is known about it: a digest that never repeats.
+            # Nothing is known about it: the digest never repeats.
             self.add("unknown", os.urandom(16))
             self.is_known = False
 
     def _class(self, made: type) -> None:
-        """Of a class Numba takes the fields, and traces what is defined in it and its parents."""
+        """Add a class: Numba takes its fields, and traces the definitions in it and its parents."""
         if made in self._classes:
             return self.add("class again", self._classes.index(made))
         self._classes.append(made)
@@ -165,21 +167,21 @@ class Frozen:
         return None
 
     def _is_by_name(self, value: Any) -> bool:
-        """Whether a thing is known by its name: what has a version, and this package where its code counts elsewhere.
+        """Whether a thing is identified by its name: by its version, or as code of this package that counts elsewhere.
 
-        The folder of the cache is named by the code of the tracer and of what it works with.
+        The name of the cache's folder follows from the code of the tracer and the versions of its tools.
         """
         if _root(value) in _KNOWN:
             return True
         return _root(value) == _PACKAGE and (self._package is None or _module_of(value).startswith(_TRACER))
 
     def _member(self, parent: type, name: str, definition: Any) -> None:
-        """A method, property or constant of a class."""
+        """Add a method, property or constant of a class."""
         given = getattr(definition, "fget", None) or getattr(definition, "__func__", definition)
         is_own = _root(parent) == _PACKAGE
         is_function = isinstance(given, types.FunctionType)
         is_of_tuples = _module_of(given).startswith(_NAMED_TUPLES) if is_function else name in _NAMED_TUPLE
-        # Python and tools write such data into a class, `copyreg` for one when an object of it is copied or pickled.
+        # Python and tools write such data into a class, such as `copyreg` when an object of it is copied or pickled.
         is_for_tools = is_own and not is_function and name.startswith("__") and name.endswith("__")
         if is_of_tuples or is_for_tools:
             return
@@ -200,20 +202,20 @@ class Frozen:
         return copy
 
     def add(self, *parts: Any) -> None:
-        """Add parts by what they print."""
+        """Add the printed form of parts."""
         for part in parts:
             self._hash.update(_text_of(part))
 
 
 def _text_of(part: Any) -> bytes:
-    """What a part prints, with its length, so that two parts are never taken for one."""
+    """Return the printed form of a part, with its length, so that two parts are never taken for one."""
     text = repr(part).encode()
     return b"%d:%b" % (len(text), text)
 
 
 @functools.cache
 def _text_of_code(code: types.CodeType) -> tuple[list[str], bytes]:
-    """The names of globals of a function in their order, and the text of its code: of the kernels of a process once."""
+    """Return the names of globals of a function in order, and the text of its code: once in each process."""
     names, text = set[str](), b""
     for part in _parts(code):
         taken = _taken(part, names)
@@ -223,13 +225,13 @@ def _text_of_code(code: types.CodeType) -> tuple[list[str], bytes]:
 
 
 def _taken(code: types.CodeType, names: set[str]) -> list[Any]:
-    """The constants that instructions take, which a docstring is not, and into `names` those of globals.
+    """Return the constants that instructions use, which exclude docstrings; add the names of globals to `names`.
 
-    `co_names` has the names of attributes too. Reading the bytes takes a tenth of the time of `dis`.
+    `co_names` also has the names of attributes. Reading the bytes takes a tenth of the time of `dis`.
     """
     constants, extended, raw = set[int](), 0, code.co_code
-    for k in range(0, len(raw), 2):
-        operation, argument = raw[k], raw[k + 1] | extended
+    for operation, last in zip(raw[::2], raw[1::2], strict=True):
+        argument = last | extended
         extended = argument << 8 if operation == dis.EXTENDED_ARG else 0
         if operation in _CONSTANTS:
             constants.add(argument)
@@ -242,7 +244,7 @@ def _taken(code: types.CodeType, names: set[str]) -> list[Any]:
 
 
 def _parts(code: types.CodeType) -> Iterator[types.CodeType]:
-    """The code and that of the functions inside it."""
+    """Yield the code and that of the functions inside it."""
     yield code
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
@@ -254,19 +256,21 @@ def _is_own(value: Any) -> bool:
 
 
 def _root(value: Any) -> str:
-    """The top module that something comes from."""
+    """Return the top module of a value."""
     return _module_of(value).partition(".")[0]
 
 
 def _module_of(value: Any) -> str:
-    """The module that something comes from, or nothing where that does not say what it is."""
+    """Return the module that identifies a value, or nothing if its module does not."""
+    if isinstance(value, (type, types.FunctionType)):  # most of what is asked about
+        return str(getattr(value, "__module__", ""))
     if isinstance(value, np.ufunc) and getattr(np, value.__name__, None) is value:
         return "numpy"
     if isinstance(value, types.ModuleType):
         return value.__name__
     if isinstance(value, types.BuiltinFunctionType) and isinstance(value.__self__, type):
         return value.__self__.__module__  # `tuple.__new__`
-    # Where an instance comes from says nothing about its value; NumPy's functions have a class of their own.
-    named = isinstance(value, (type, types.FunctionType, types.BuiltinFunctionType))
+    # The module of an instance does not describe its value; NumPy's functions have a class of their own.
+    named = isinstance(value, types.BuiltinFunctionType)
     named = named or (callable(value) and type(value).__module__.split(".")[0] == "numpy")
     return str(getattr(value, "__module__", "")) if named else ""

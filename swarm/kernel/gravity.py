@@ -1,4 +1,4 @@
-"""Constant gravity, or none: the exact free flight, and when a parabola along it rises through 0."""
+"""Constant gravity, or none: the exact free flight, and the time at which a parabola along it rises through 0."""
 
 import math
 
@@ -12,7 +12,7 @@ class Gravity(Vec):
 
 
 class Bounds(Record):
-    """Of the speed, the acceleration and the jerk in the frame of a wall for some time, whatever their directions."""
+    """Bounds of the speed, the acceleration and the jerk in the frame of a wall for some time, in any direction."""
 
     speed: float
     acceleration: float
@@ -20,7 +20,7 @@ class Bounds(Record):
 
 
 def as_vector(gravity):
-    """G as a vector like any other."""
+    """Return G as an ordinary vector."""
     return Vec(gravity.x, gravity.y, gravity.z)
 
 
@@ -38,17 +38,17 @@ def accelerated(gravity, v, t):
 
 
 def potential(gravity, r):
-    """Potential energy per mass, -G.r"""
+    """Return the potential energy per mass, -G.r."""
     return 0.0 if gravity is None else -dot(gravity, r)
 
 
 def weight(gravity, s):
-    """The largest change of the potential energy per mass when the coordinates change by s."""
+    """Return the largest change of the potential energy per mass when the coordinates change by s."""
     return 0.0 if gravity is None else dot(absolute(gravity), s)
 
 
 def rise_time(c, b, a):
-    """First t >= 0 at which c + 2 b t + a t^2 rises through 0, where c <= 0 up to round-off; else infinity.
+    """Return the first t >= 0 at which c + 2 b t + a t^2 rises through 0, where c <= 0 up to round-off; else infinity.
 
     A cavity has a > 0, a solid a < 0, a plane a = 0. Branch-free.
     """
@@ -56,24 +56,24 @@ def rise_time(c, b, a):
 
 
 def rise_time_by(c, b, a, discriminant):
-    """`rise_time` with a discriminant better than b^2 - a c, of which nothing is left some 1e8 sizes from a solid."""
+    """`rise_time` with a discriminant more exact than b^2 - a c, which has no digits about 1e8 sizes from a solid."""
     time, bottom = _outer_root(c, b, a, discriminant)
     misses = (bottom <= 0.0) | ((a < 0.0) & (discriminant < 0.0))
     return select(misses, math.inf, select(time > 0.0, time, 0.0))
 
 
 class Quotient(Record):
-    """A time as a quotient, infinite where the divisor is 0: of several the soonest is found by products alone."""
+    """A time as a quotient, infinite if the divisor is 0: the first of several is found by products alone."""
 
     over: float
     under: float
 
     def sooner(self, other):
-        """The sooner of two."""
+        """Return the smaller of two."""
         return Quotient(*select(other.over * self.under < self.over * other.under, tuple(other), tuple(self)))
 
     def time(self):
-        """Its value."""
+        """Return its value."""
         is_finite = self.under > 0.0
         return select(is_finite, self.over / select(is_finite, self.under, 1.0), math.inf)
 
@@ -96,13 +96,13 @@ def rise_time_inside(c, b, a):
 
 
 def _outer_root(c, b, a, discriminant):
-    """The root at which c + 2 b t + a t^2 rises, and its denominator."""
+    """Return the root at which c + 2 b t + a t^2 rises, and its denominator."""
     over, under = _outer_quotient(c, b, a, discriminant)
     return over / under, under
 
 
 def _outer_quotient(c, b, a, discriminant):
-    """That root as a quotient."""
+    """Return this root as a quotient."""
     # a > 0, c > 0 by round-off at a grazing hit: the flight touches, it does not miss.
     root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
     approaching = b > 0.0

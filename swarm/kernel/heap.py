@@ -1,7 +1,7 @@
-"""A queue of events: a heap that knows where each item is, of four children a node.
+"""A queue of events: a heap that knows the place of each item, with four children for each node.
 
-The order is that of the keys, and of the numbers of the items where keys are equal: whatever was done to a heap before,
-the first item is the same.
+The order is that of the keys, and of the numbers of the items for equal keys: the first item does not depend on the
+history of the heap.
 """
 
 from typing import NamedTuple
@@ -9,12 +9,12 @@ from typing import NamedTuple
 from .arrays import index
 from .jit import Array, select
 
-# Children of a node: half as many levels as two, and the children are beside one another in memory.
+# Children of a node: half as many levels as with two, and the children are neighbours in memory.
 _CHILDREN = 4
 
 
 class Heap(NamedTuple):
-    """Each item's key, and the nodes: arrays of one length."""
+    """The key of each item, and the nodes: arrays of one length."""
 
     key: Array  # (N,) of the items
     item: Array  # (N,) in the nodes; node 0 is the first
@@ -32,7 +32,7 @@ def _put(heap, node, item):
 
 
 def _least_child(heap, node):
-    """The child node with the item that comes first, or -1 for a node without children."""
+    """Return the child node with the item that comes first, or -1 for a node without children."""
     first = _CHILDREN * node + 1
     least, end = first, min(first + _CHILDREN, heap.item.size)
     for child in range(first + 1, end):
@@ -42,7 +42,7 @@ def _least_child(heap, node):
 
 
 def sink(heap, node):
-    """Order a heap where the key of the item at this node has grown."""
+    """Restore the order of a heap after the key of the item at this node has grown."""
     item = heap.item[index(node)]
     while True:
         child = _least_child(heap, node)
@@ -54,7 +54,7 @@ def sink(heap, node):
 
 
 def rise(heap, node):
-    """Order a heap where the key of the item at this node has become less."""
+    """Restore the order of a heap after the key of the item at this node has become smaller."""
     item = heap.item[index(node)]
     while node > 0:
         above = (node - 1) // _CHILDREN
@@ -66,7 +66,7 @@ def rise(heap, node):
 
 
 def build(heap):
-    """Order a heap whatever its keys are."""
+    """Order a heap with arbitrary keys."""
     for node in range((heap.item.size - 2) // _CHILDREN, -1, -1):
         sink(heap, node)
 

@@ -1,6 +1,6 @@
-"""Machine code of kernels: from their functions by the trace and Numba, once on each machine, and from the disk then.
+"""Machine code of kernels: made from their functions by the trace and Numba, once on each machine, then read from disk.
 
-The one place for the compiler's flags. Imported when a kernel is first compiled or looked for, see `deferred.py`.
+The only place for the compiler's flags. Imported when a kernel is first compiled or looked for, see `deferred.py`.
 """
 
 import contextlib
@@ -49,26 +49,26 @@ _HERE = Path(__file__).parent
 # Strict IEEE arithmetic: `fastmath` would let the compiler reorder sums, and with them the energy balance.
 # The NumPy error model makes 1/0 an infinity; Python's would put a branch before every division, and a
 # branch in the lane loop costs its vectorisation.
-# Without reference counts: each array that a NamedTuple hands on counts as taken and given back, by an atomic
+# Without reference counts: each array of a NamedTuple that is passed on counts as taken and given back, by an atomic
 # instruction that two threads do for the same arrays. They were 100 of the 140 ns of a particle that flies freely
-# through a frame, and a third of what there is to compile. So kernels make no arrays but `scratch`.
+# through a frame, and a third of the code to compile. So kernels make no arrays but `scratch`.
 _FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
-# C calls no kernel.
+# No kernel is called from C.
 _KERNEL: Any = {"no_cfunc_wrapper": True, **_FLAGS}
-# Only kernels call helpers, and Python never their compiled form: no wrappers saves a fifth of the compile time.
+# Only kernels call helpers, and Python never their compiled form: omitting wrappers saves a fifth of the compile time.
 _OUTLINE: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": PartCompiler, **_FLAGS}
 _INLINE: Any = {"forceinline": True, **_OUTLINE}
-# What of a user's functions cannot be traced, and what may make arrays.
+# Functions of the user that cannot be traced, and functions that may make arrays.
 _ALLOCATING: Any = {**_INLINE, "_nrt": True}
 calls.leave = leaving(_ALLOCATING)
 emit_spaced = emission.emit_spaced
 
 
 def _find_scipy_only() -> None:
-    """Let Numba look whether SciPy is there, as it does before the first kernel, without importing its linear algebra.
+    """Let Numba look for SciPy, as it does before the first kernel, without importing its linear algebra.
 
-    The import is 0.1 of 0.8 s of every start where SciPy is installed, for products of matrices, which no kernel here
-    has. One that has them imports it as it always did.
+    The import takes 0.1 of 0.8 s of every start if SciPy is installed, for products of matrices, which no kernel here
+    has. A kernel with such products imports it as always.
     """
     ask: Any = blas.ensure_blas
 
@@ -86,12 +86,12 @@ def _find_scipy_only() -> None:
 _find_scipy_only()
 
 
-# --- What modules declare --------------------------------------------------------------------------------
+# --- For the declarations of modules ---------------------------------------------------------------------
 
 
 def kernel_of(kernel: Kernel) -> Any:
-    """Numba's dispatcher of a kernel."""
-    # Numba keeps what it knows of a function by its identity: a kernel that is made again has one of its own.
+    """Return Numba's dispatcher of a kernel."""
+    # Numba keeps its data of a function by its identity: a kernel that is made again has a function of its own.
     function = kernel.py_func
     traced = FunctionType(
         function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
@@ -108,12 +108,12 @@ def prepare_helper(function: Any, is_outlined: bool = False, body: Any = None) -
     prepare(function, flags, outlined=is_outlined, body=body)
 
 
-# Where no context is open, as in `pack`, the sentence goes to the log alone.
+# Without an open context, as in `pack`, the sentence goes only to the log.
 _unlistened = Listener(lambda _sentence: None, sentence_of)
 
 
 class _Announcer(event.Listener):  # type: ignore[misc]
-    """Hands on to the contexts that are open when a compilation begins and ends."""
+    """Pass the beginning and the end of each compilation to the open contexts."""
 
     def on_start(self, compiled: Any) -> None:
         function = compiled.data["dispatcher"]
@@ -132,9 +132,9 @@ event.register("numba:compile", _Announcer())
 
 
 def cache_folder() -> Path:
-    """Folder of the compiled kernels: that of all that is kept, then a digest of the code that makes them.
+    """Return the folder of the compiled kernels: the base folder, then a digest of the code that makes them.
 
-    That is this folder, which every kernel goes through. What else a kernel is made of is in its key, see `digest.py`.
+    It is the code of this folder, which every kernel goes through. The rest of its code is in its key, see `digest.py`.
     """
     files = sorted(_HERE.rglob("*.py"))
     return base() / _digest([(path.relative_to(_HERE).as_posix(), *_code(path)) for path in files])
@@ -147,7 +147,7 @@ def _digest(texts: Any) -> str:
 
 
 def _code(path: Path) -> Iterator[Any]:
-    """The code of a module, without comments and docstrings: Python has compiled it already, or keeps it now."""
+    """Yield the code of a module, without comments and docstrings: Python has compiled it already, or keeps it now."""
     whole: Any = SourceFileLoader(path.stem, str(path)).get_code(path.stem)
     found = [whole]
     for code in found:
@@ -166,7 +166,7 @@ _folder = functools.cache(cache_folder)
 
 
 def cached(function: Callable[..., Any], flags: dict[str, Any], compiled: Callable[..., Any] | None = None) -> Any:
-    """The kernel of a function: Numba compiles it, or `machine_code` in its place, where no earlier process has."""
+    """Return the kernel of a function: Numba compiles it, or `compiled` in its place, unless an earlier process has."""
     if is_disabled():
         return function
     previous = _CONFIG.CACHE_DIR
@@ -183,7 +183,7 @@ def cached(function: Callable[..., Any], flags: dict[str, Any], compiled: Callab
         # comment.
         name, stamp = f"{function.__module__}.{function.__qualname__}.{sys.implementation.cache_tag}", ""
     disk._cache_file = File(disk.cache_path, name, stamp)
-    # On the object: Numba's own code calls it from C and from other kernels, and a class of ours would have to be
+    # On the object: Numba's own code calls it from C and from other kernels, and a subclass would have to be
     # registered as its target's.
     made.compile = functools.partial(_compile_once, made, made.compile)
     _kernels.append(made)
@@ -191,7 +191,7 @@ def cached(function: Callable[..., Any], flags: dict[str, Any], compiled: Callab
 
 
 def calling(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function that calls another, all that Numba compiles of a kernel by itself: the other is traced into it."""
+    """Return a function that only calls another, for Numba to compile as a kernel: the other is traced into it."""
     names = ", ".join(inspect.signature(function).parameters)
     scope: dict[str, Any] = {"__name__": function.__module__, "traced": function}
     code = compile(f"def {function.__name__}({names}): return traced({names})", function.__code__.co_filename, "exec")
@@ -200,7 +200,7 @@ def calling(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
-    """A kernel is found only if all code that it may trace is unchanged, for the same processor and level of LLVM."""
+    """The cache of a kernel, found only if all code that it may trace, the processor and LLVM's level are unchanged."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
@@ -212,7 +212,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         return self._keys[kinds]
 
     def was_compiled(self, kinds: Any, codegen: Any) -> bool:
-        """Whether it was compiled for arguments of these types, of whatever code."""
+        """Whether it was compiled for arguments of these types, with any code."""
         return kinds in self._keys or was_compiled(*self._asked(kinds, codegen))
 
     def _asked(self, kinds: Any, codegen: Any) -> tuple[Any, ...]:
@@ -220,20 +220,20 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         return self._py_func, kinds, processor, _folder() / _DIGESTS
 
     def save_overload(self, kinds: Any, made: Any) -> None:
-        # What Python code inside of a helper needs, as Numba does it for a kernel that it loads.
+        # The environment of Python code inside of a helper, as Numba sets it for a kernel that it loads.
         for environment in made._find_referenced_environments():
             made.library.codegen.set_env(environment.env_name, environment)
         # Of two processes that save the same kernel for other arguments, both would take the same name for their code
-        # and one would lose its entry of the index: a kernel for other arguments than it says would be loaded.
-        # A disk that is full costs the next process its time, and this one nothing.
+        # and one would lose its entry of the index: a kernel would be loaded for the wrong arguments.
+        # A full disk costs the next process its time, and this one nothing.
         with held(Path(self._cache_file._index_path + _LOCK)), contextlib.suppress(OSError):
             super().save_overload(kinds, made)
 
 
 def _compile_once(kernel: Any, compile: Callable[[Any], Any], signature: Any) -> Any:
-    """Numba's `compile`, of all processes in one at a time for the same kernel and arguments.
+    """Numba's `compile`, in one process at a time for the same kernel and arguments.
 
-    The others wait, and find it on disk: 50 runs that start together took the compile time of 50.
+    The others wait, and find the kernel on disk: without this, 50 runs that start together took the compile time of 50.
     """
     kinds = tuple(sigutils.normalize_signature(signature)[0])
     if _is_found(kernel, kinds):
@@ -247,7 +247,7 @@ def _key_of(kernel: Any, kinds: Any) -> str:
 
 
 def _lock_of(kernel: Any, kinds: Any) -> Path:
-    """The file that a process locks while it compiles a kernel for such arguments."""
+    """Return the file that a process locks while it compiles a kernel for such arguments."""
     return Path(f"{kernel._cache._cache_file._index_path}.{_key_of(kernel, kinds)}{_LOCK}")
 
 
@@ -259,19 +259,19 @@ def _is_found(kernel: Any, kinds: Any) -> bool:
         return False
     file = kernel._cache._cache_file
     name = file._load_index().get(_key_of(kernel, kinds))
-    # A kill may come between the entry of the index and its file.
+    # A kill may come between the entry of the index and the file of the kernel.
     return name is not None and os.path.exists(file._data_path(name))
 
 
 def kind_of(function: Any, arguments: tuple[Any, ...]) -> str:
-    """A name for what a function is compiled for."""
+    """Return a name for the types that a function is compiled for."""
     return key_of(tuple(map(numba.typeof, arguments)), function.__module__, function.__qualname__).text
 
 
 def is_found(kernel: Any, arguments: tuple[Any, ...]) -> bool:
     """Whether a kernel is compiled for such arguments, in this process or on disk."""
     try:
-        # What the dispatcher itself compares of arguments; their types take a hundred times as long.
+        # The fingerprints that the dispatcher itself compares; the types of arguments take a hundred times as long.
         known = kernel, tuple(map(compute_fingerprint, arguments))
     except NotImplementedError:
         return _is_found(getattr(kernel, "compiled", kernel), tuple(map(numba.typeof, arguments)))

@@ -1,13 +1,13 @@
-"""One process at a time: locks of names in the folder of compiled kernels, which the system releases at any death."""
+"""One process at a time: locks of names in the folder of kernels, which the system releases when a process dies."""
 
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
-# No compilation takes so long [s]: a lock that lasts is one of a disk that has none. Two processes that compile the
+# No compilation takes this long [s]: a lock that lasts is one of a disk without locks. Two processes that compile the
 # same kernel are slower, but not wrong.
 _LONGEST = 300.0
-# A waiting process looks so often [s]; a compilation takes seconds.
+# The interval at which a waiting process looks [s]; a compilation takes seconds.
 _GLANCE = 0.05
 
 

@@ -1,6 +1,6 @@
-"""Random numbers that depend on nothing but a seed, a particle and a count: the same for any threads and any resume.
+"""Random numbers from a seed, a particle and a count alone: the same for any threads and any resume.
 
-Only + - * / and sqrt of floats, and products of 32-bit words: plain Python, kernels and every machine have the same
+Only + - * / and sqrt of floats, and products of 32-bit words: plain Python, kernels and all machines give the same
 bits. No branches, and loops of fixed length: a lane loop vectorises.
 """
 
@@ -15,19 +15,19 @@ from .vector import Vec, cross
 # Philox4x32-10 of Salmon et al., "Parallel random numbers: as easy as 1, 2, 3" (SC 2011).
 _ROUNDS = 10
 _MULTIPLIERS = 0xD2511F53, 0xCD9E8D57
-_WEYL = 0x9E3779B9, 0xBB67AE85  # what is added to the key from round to round
+_WEYL = 0x9E3779B9, 0xBB67AE85  # added to the key in each round
 _WORD = 0xFFFFFFFF
 
 # The blocks of an event's counter that `uniforms` takes, and those of each law.
 _BLOCKS, _LAW = 2, 1 << 20
 
 _HALF_PI = 1.5707963267948966
-# (2^k, k): a number below 2^-k is scaled by 2^k, and then is below 1 still.
+# (2^k, k): a number below 2^-k is scaled by 2^k, and remains below 1.
 _SCALES = tuple((float(1 << k), float(k)) for k in (32, 16, 8, 4, 2, 1))
-# Of the rest of a sine and a cosine, from the last.
+# Coefficients of the series of sine and cosine after their first terms, in reverse order.
 _SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(8, 0, -1))
 _COSINE = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(8, 1, -1))
-# Adding it and taking it away rounds a small float to an integer, ties to even.
+# Adding and subtracting it rounds a small float to an integer, ties to even.
 _ROUNDING = 1.5 * 2.0**52
 
 
@@ -41,7 +41,7 @@ class Uniforms(NamedTuple):
 
 
 def philox(counter, key):
-    """The four 32-bit words of Philox4x32-10 at a counter of four words and a key of two.
+    """Return the four 32-bit words of Philox4x32-10 at a counter of four words and a key of two.
 
     In kernels a product of two words may come out negative, as a signed number of the same 64 bits: with the masks that
     makes no difference.
@@ -57,14 +57,14 @@ def philox(counter, key):
 
 
 def _fraction(high, low):
-    """(k + 1/2)/2^52 of the upper 20 bits of one word and another word: exact, and never 0 or 1."""
+    """Return (k + 1/2)/2^52 for the upper 20 bits of one word and another word: exact, and never 0 or 1."""
     return ((high >> 12) * 2.0**32 + low + 0.5) * 2.0**-52
 
 
 def uniforms(seed, particle, number):
-    """The random numbers of one event of a particle.
+    """Return the random numbers of one event of a particle.
 
-    Of the integers the lower 64 bits count, signed or not, and of `particle` the lower 32.
+    The lower 64 bits of the integers count, signed or not, and the lower 32 bits of `particle`.
     """
     seed, particle, number = int(seed), int(particle), int(number)
     key = seed & _WORD, (seed >> 32) & _WORD
@@ -75,40 +75,40 @@ def uniforms(seed, particle, number):
 
 
 class Stream(Record):
-    """The random numbers of one event of a particle: of a seed, the particle, and the number of the event.
+    """The random numbers of one event of a particle, from a seed, the particle, and the number of the event.
 
-    They have numbers of their own, so that a branch that needs none changes no others. Two of one block, 2 j and
+    Each has a number k, so that a branch that needs none changes no others. The two of a block, 2 j and
     2 j + 1, cost as much as one.
     """
 
     seed: Any
     particle: Any
     number: Any
-    law: int = 0  # of several laws of one event each has numbers of its own, this many blocks further
+    law: int = 0  # the first block of a law; several laws of one event have numbers of their own
     across: Any = None  # the axis across the plane of a scene of two dimensions, or None
 
     def of_law(self, k):
-        """The stream of the k-th law."""
+        """Return the stream of the k-th law."""
         return self._replace(law=k * _LAW)
 
     def uniform(self, k):
-        """The k-th uniform number in (0, 1); k from 0 on."""
+        """Return the k-th uniform number in (0, 1); k from 0 on."""
         seed, particle, number = int(self.seed), int(self.particle), int(self.number)
         counter = number & _WORD, (number >> 32) & _WORD, particle & _WORD, (k >> 1) + _BLOCKS + self.law
         a, b, c, d = philox(counter, (seed & _WORD, (seed >> 32) & _WORD))
         return select((k & 1) == 0, _fraction(a, b), _fraction(c, d))
 
     def exponential(self, k):
-        """-ln of the k-th uniform number: of mean 1."""
+        """Return -ln of the k-th uniform number: of mean 1."""
         return -logarithm(self.uniform(k))
 
     def normal(self, k):
-        """A normal number of variance 1 (Box and Muller), of the uniform numbers k and k + 1."""
+        """Return a normal number of variance 1 (Box and Muller), from the uniform numbers k and k + 1."""
         cosine, _sine = circle(self.uniform(k + 1))
         return math.sqrt(-2.0 * logarithm(self.uniform(k))) * cosine
 
     def diffuse(self, n, u, k):
-        """A unit vector by the cosine law about a unit vector n, of a number u in (0, 1) and the uniform number k.
+        """Return a unit vector by the cosine law about a unit vector n, from u in (0, 1) and the uniform number k.
 
         Its part along n is sqrt(u); in a plane its part across n is uniform in (-1, 1), which needs no number k.
         """
@@ -122,7 +122,7 @@ class Stream(Record):
 
 
 def logarithm(u):
-    """ln u for u in [2^-63, 1], to one unit in the last place."""
+    """Return ln u for u in [2^-63, 1], to one unit in the last place."""
     e = 0.0
     for scale, k in _SCALES:
         small = u * scale < 1.0
@@ -131,10 +131,10 @@ def logarithm(u):
 
 
 def circle(u):
-    """cos(2 pi u) and sin(2 pi u) for u in [0, 1], to two units in the last place.
+    """Return cos(2 pi u) and sin(2 pi u) for u in [0, 1], to two units in the last place.
 
-    4 u = n + y with an integer n and |y| <= 1/2, both exact; Taylor's series at the angle pi y/2, at most pi/4; its
-    next terms are below 2e-18; then a turn by n quarters.
+    4 u = n + y with an integer n and |y| <= 1/2, both exact; Taylor's series at the angle pi y/2, at most pi/4, where
+    the neglected terms are below 2e-18; then a turn by n quarters.
     """
     turns = 4.0 * u
     n = (turns + _ROUNDING) - _ROUNDING
@@ -152,11 +152,11 @@ def circle(u):
 
 
 def flux_maxwellian(n, speed2, u, across=None):
-    """The velocity with which a particle leaves a diffuse wall with the unit normal n, against n.
+    """Return the velocity with which a particle leaves a diffuse wall with the unit normal n, against n.
 
-    `speed2` is k_B T/m, `across` the axis across the plane that it stays in, or None. The normal speed has the
-    distribution 1 - exp(-w^2/(2 speed2)) of what passes a plane in a gas at rest, the two tangential components are
-    Gaussian (Box and Muller); in a plane there is one.
+    `speed2` is k_B T/m, `across` the axis across the plane of the particle, or None. The normal speed has the
+    distribution 1 - exp(-w^2/(2 speed2)) of particles that pass a plane in a gas at rest, the two tangential components
+    are Gaussian (Box and Muller); in a plane there is one.
     """
     if across is not None:
         cosine, _sine = circle(u.angle)
@@ -170,7 +170,7 @@ def flux_maxwellian(n, speed2, u, across=None):
 
 
 def tangents(n):
-    """Two unit vectors across a unit vector and each other: Duff et al., JCGT 6 (2017)."""
+    """Return two unit vectors across a unit vector and each other: Duff et al., JCGT 6 (2017)."""
     sign = math.copysign(1.0, n.z)
     a = -1.0 / (sign + n.z)
     b = n.x * n.y * a

@@ -1,4 +1,4 @@
-"""Records: named tuples that may have base classes, with which they share methods.
+"""Records: named tuples that may have base classes, from which they inherit methods.
 
 Numba passes a named tuple in registers and knows its class. Python's own `NamedTuple` takes no other base class.
 """
@@ -13,7 +13,7 @@ from ..errors import SceneError
 _named: Any = collections.namedtuple
 # Flags of a function that takes any number of arguments.
 _ANY_NUMBER = 0x0C
-# What Python writes for a named tuple by itself.
+# The attributes that Python writes for a named tuple by itself.
 _KEPT = ("__dict__", "__doc__", "__module__", "__qualname__", "__slots__", "__weakref__")
 
 
@@ -29,14 +29,14 @@ class _RecordType(type):
             if given != list(fields)[len(fields) - len(given) :]:
                 raise SceneError(f"the fields of {name} that have defaults must be its last, got {', '.join(fields)}")
             made = _named(name, fields, defaults=[namespace.pop(one) for one in given])
-            # Into the class itself: a field goes before what a base class has by its name.
+            # Into the class itself: a field takes precedence over an attribute of a base class with its name.
             namespace = {**{key: one for key, one in vars(made).items() if key not in _KEPT}, **namespace}
         namespace.setdefault("__slots__", ())
         return super().__new__(cls, name, bases, namespace)
 
 
 def _check(name: str, bases: tuple[type, ...], namespace: dict[str, Any], fields: Any) -> None:
-    """Raise a `SceneError` where a class hides a field or a method that kernels would ask for."""
+    """Raise a `SceneError` if a class hides a field or a method that kernels need."""
     for base in bases:
         if fields and getattr(base, "_fields", ()):
             raise SceneError(f"{name} must add no fields to those of {base.__name__}, got {', '.join(fields)}")
@@ -54,7 +54,7 @@ def _check(name: str, bases: tuple[type, ...], namespace: dict[str, Any], fields
 
 
 def _arguments(code: Any) -> Any:
-    """The names of a function's arguments; None where it takes any number of them."""
+    """Return the names of a function's arguments; None if it takes any number of them."""
     return None if code.co_flags & _ANY_NUMBER else code.co_varnames[: code.co_argcount]
 
 
@@ -62,11 +62,11 @@ _EMPTY: Any = _named("Record", ())
 
 
 class Record(_EMPTY, metaclass=_RecordType):  # type: ignore[misc]
-    """A named tuple of the fields that a class annotates, or of those of its base class.
+    """A named tuple with the fields that a class annotates, or with those of its base class.
 
     Raises:
-        SceneError: a class adds fields to those of its base, has a field and a method of one name, or a method of other
-            arguments than that of its base.
+        SceneError: a class adds fields to those of its base, has a field and a method with the same name, or a method
+            with other arguments than in its base.
 
     >>> class Shape(Record):
     ...     def twice(self):

@@ -1,6 +1,6 @@
 """Vectors of three numbers, with the operators of Python: the same definitions in kernels and in plain Python.
 
-They are prepared for Numba too: a function that cannot be traced may use them.
+Numba has them too: a function that cannot be traced may use them.
 """
 
 from typing import Any, NamedTuple
@@ -9,9 +9,9 @@ import numpy as np
 
 from .jit import Array, inlined, select
 
-# What a velocity is scaled by to restore its square is 1 within round-off, unless next to nothing is left of it.
+# The factor that restores the square of a velocity is 1 within round-off, unless next to nothing is left of it.
 _NEAR = 1e-6
-# Makes a vector as C does: by its name it is made by a function of Python, a quarter of the time of a plain operator.
+# Makes a vector in C: the name of the class would call a function of Python, a quarter of the time of an operator.
 _new = tuple.__new__
 
 
@@ -56,7 +56,7 @@ class Symmetric(NamedTuple):
 
 
 def vec(values: Any) -> Vec:
-    """Three numbers, or the three rows of an array, as a vector."""
+    """Return three numbers, or the three rows of an array, as a vector."""
     x, y, z = values
     return _new(Vec, (x, y, z))
 
@@ -75,7 +75,7 @@ def square(a):
 
 @inlined
 def with_square(v, speed2):
-    """A velocity of the square speed2, from within round-off, without a bias, which 1e8 collisions would show.
+    """Return a velocity with the square speed2, from within round-off, without a bias, which 1e8 collisions would show.
 
     By one Newton step of the square root, as a sum: a factor 1 + x rounds x up and down by different steps.
     """
@@ -88,13 +88,13 @@ def with_square(v, speed2):
 @inlined
 def norm(a):
     """|a|"""
-    # Of NumPy, so that in plain Python too 1/|0| is an infinity.
+    # NumPy's root, so that in plain Python too 1/|0| is an infinity.
     return np.sqrt(a.x * a.x + a.y * a.y + a.z * a.z)
 
 
 @inlined
 def times(a, b):
-    """The products of the components: the diagonal matrix a times b."""
+    """Return the products of the components: the diagonal matrix a times b."""
     return _new(Vec, (a.x * b.x, a.y * b.y, a.z * b.z))
 
 
@@ -106,31 +106,31 @@ def cross(a, b):
 
 @inlined
 def absolute(a):
-    """The magnitudes of the components."""
+    """Return the magnitudes of the components."""
     return _new(Vec, (abs(a.x), abs(a.y), abs(a.z)))
 
 
 @inlined
 def total(a):
-    """The sum of the components."""
+    """Return the sum of the components."""
     return a.x + a.y + a.z
 
 
 @inlined
 def largest(a):
-    """The largest magnitude of a component."""
+    """Return the largest magnitude of a component."""
     return max(abs(a.x), abs(a.y), abs(a.z))
 
 
 @inlined
 def lowest(a, b):
-    """The smaller one of each two components."""
+    """Return the smaller of each pair of components."""
     return _new(Vec, (min(a.x, b.x), min(a.y, b.y), min(a.z, b.z)))
 
 
 @inlined
 def highest(a, b):
-    """The larger one of each two components."""
+    """Return the larger of each pair of components."""
     return _new(Vec, (max(a.x, b.x), max(a.y, b.y), max(a.z, b.z)))
 
 
@@ -148,7 +148,7 @@ def moves(a):
 
 @inlined
 def column(rows: Array, row, i):
-    """The vector in three rows of a column."""
+    """Return the vector in three rows of a column."""
     return _new(Vec, (rows[row, i], rows[row + 1, i], rows[row + 2, i]))
 
 

@@ -7,39 +7,39 @@ from ..surfaces.walls import Field, Listed
 
 
 def lose(state, i, before, after):
-    """Book what is left of twice the energy per mass."""
+    """Book the loss from `before` to `after` of twice the energy per mass."""
     if before != after:
         state.energy[i] = 0.5 * after
         state.dissipated[i] += 0.5 * (before - after) * state.mass[i]
 
 
 def book(walls, state, i, wall, change, given, loses, booked=0.0):
-    """Book a change (before, after) of twice the energy per mass at a wall, which gives so much of it by its motion.
+    """Book a change (before, after) of twice the energy per mass at a wall; `given` is the work of its motion in it.
 
-    A part of this work may be booked already.
+    The part `booked` of this work is booked already.
     """
     before, after = change
     if not isinstance(walls, Carried):
         lose(state, i, before, after)
         return
-    # Where nothing is lost all of it is work, to the last digit.
+    # Without losses the whole change is work, to the last digit.
     given = given if loses else after - before
     state.energy[i] = 0.5 * after
     state.dissipated[i] += 0.5 * (before - after + given) * state.mass[i]
     state.impulse[walls.length() + walls.row(wall), i] += 0.5 * (given - booked) * state.mass[i]
 
 
-# --- Of a lane ------------------------------------------------------------------------------------------
+# --- For a lane -----------------------------------------------------------------------------------------
 
 
 def add_work(walls, impulse, i, wall, given):
-    """The work of walls that move is in the rows after those of the impulses."""
+    """Add the work of a moving wall to the rows of work, which follow the rows of impulses."""
     if isinstance(walls, Carried):
         add_to_rows(walls, impulse, walls.length(), i, wall, given)
 
 
 def add_to_rows(walls, rows, row, i, wall, given):
-    """rows[row + the row of a wall, i] += given, without a branch; of no wall 0 is given."""
+    """Add to rows[row + the row of a wall, i] without a branch; without a wall `given` is 0."""
     if len(walls.each) == 1 and not walls.fields():
         # A loop over rows here would not vectorise.
         rows[row, i] += given

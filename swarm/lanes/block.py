@@ -1,8 +1,8 @@
-"""The particles of a block to the end of a frame, many at once, each in a lane.
+"""Advance the particles of a block to the end of a frame, many at once, each in a lane.
 
 One pass does one flight and one contact for every live lane, in loops without branches, which LLVM vectorises. A lane
-retires when its particle reaches the end of the frame, and takes the next particle, or that of the last live lane. The
-result does not depend on the lane or the block of a particle.
+retires when its particle reaches the end of the frame, and takes the next particle, or that of the last live lane.
+The result does not depend on the lane or the block of a particle.
 """
 
 import math
@@ -27,26 +27,26 @@ from .solve import count_sweeps, keep_failure, solution, solve
 from .table import LANES, LOOK, marked_lanes, with_distances
 from .watching import log as impact_log
 
-# The most impacts of one particle in one frame. More are an error, which comes in seconds, not hours, in a cusp.
+# The most impacts of one particle in one frame. Beyond them a cusp gives an error after seconds, not hours.
 MOST_HITS = 1e8
 # A number of passes that no call of `advance_block` reaches.
 NEVER = 2**63 - 1
 
 
 class Hard(Record):
-    """The argument of kernels that do hard contacts, which double what is compiled and are rare in a smooth cavity."""
+    """The argument of kernels with hard contacts, which double the code to compile and are rare in a smooth cavity."""
 
     most_hits: float
 
 
 @kernel
 def advance_block(method, walls, gravity, hard, share, lanes):
-    """Advance the particles that a thread draws to the end of a frame: (status, particle, drawn).
+    """Advance the particles that a thread draws to the end of a frame; return (status, particle, drawn).
 
-    The status is DONE, or says how `particle` failed, the first that did; `drawn` is the number of draws. The contents
+    The status is DONE or the failure of `particle`, the first that failed; `drawn` is the number of draws. The contents
     of `lanes` are overwritten. Particles that have arrived are skipped. Three other statuses ask for another call:
-        INTERRUPTED   after `share.halt[0]` passes, a number that another thread may change at any time: then `particle`
-                      is the number of live lanes, and the next call takes `lanes.left_behind` as `share.halted`;
+        INTERRUPTED   after `share.halt[0]` passes, a number that another thread may change at any time; `particle` is
+                      the number of live lanes, and the next call takes `lanes.left_behind` as `share.halted`;
         HARD_CONTACT  at the first hard contact in a call without `hard`: a kernel with `hard` goes on from there;
         LOG_FULL      the next call goes on with an empty log and the same lanes.
     """
@@ -73,7 +73,7 @@ def advance_block(method, walls, gravity, hard, share, lanes):
         count_sweeps(state.multipliers, lanes, live)
         if not (some_arrived or some_hard):
             continue
-        # From the last, so that every lane behind one that has arrived is still under way, and may take its place.
+        # From the last: then every lane behind one that has arrived is still under way and may take its place.
         for k in range(marked_lanes(lanes, live) - 1, -1, -1):
             lane = index(lanes.order[k])
             lanes.retire(method, walls, share, lane)
@@ -88,7 +88,7 @@ def advance_block(method, walls, gravity, hard, share, lanes):
 
 
 def _halts(share, lanes, place, live, passes):
-    """The status with which the call ends before the next pass, or DONE."""
+    """Return the status with which the call ends before the next pass, or DONE."""
     if passes >= share.halt[0]:
         lanes.leave(live)
         if share.counters is not None:
@@ -103,7 +103,7 @@ def _halts(share, lanes, place, live, passes):
 
 @outlined
 def _rare(hard, method, walls, gravity, share, lanes, live, some_hard):
-    """The part of a pass that is seldom needed: (the worst status, its lane)."""
+    """Make the part of a pass that is seldom needed; return (the worst status, its lane)."""
     if not some_hard:
         return _look(method, walls, share.state, lanes, live)
     if hard is None:
@@ -113,18 +113,18 @@ def _rare(hard, method, walls, gravity, share, lanes, live, some_hard):
 
 @outlined
 def _look(method, walls, state, lanes, live):
-    """Whether a particle has too many impacts, or no time has passed since the last look: (status, its lane).
+    """Find a particle with too many impacts, or without progress since the last look; return (status, its lane).
 
-    The narrower a wedge is, the more impacts have no time between them. They come to an end, so these are counted.
-    In a gap of no width a particle returns to the state of the last look. In a cusp that is thinner than round-off it
-    would not have turned round at the largest number of impacts. What loses energy meanwhile may come to rest.
+    The narrower a wedge is, the more impacts have no time between them. They come to an end, so they are counted.
+    In a gap of zero width a particle returns to its state at the last look. In a cusp thinner than round-off it would
+    not have turned round after the largest number of impacts. A particle that loses energy meanwhile may come to rest.
     """
-    # Walls that close on a particle hit it without end; also by safe steps so many hits take only seconds.
+    # Walls that close on a particle hit it without end. The smaller limit keeps this to seconds with safe steps too.
     most_hits = 0.1 * MOST_HITS if isinstance(walls, Carried) else MOST_HITS
     for i in range(live):
         lane, p, status = lanes.lane(i), float(lanes.particle[i]), Status.DONE.value
         if method.laws.own is not None and math.isnan(lane.remaining):
-            # The arguments of the law are in the state.
+            # The state holds the arguments of the law.
             return Status.SENT_WRONG.value, i
         if method.holds and lane.hits > most_hits:
             status = Status.STALLED.value
@@ -145,7 +145,7 @@ def _look(method, walls, state, lanes, live):
 
 @outlined
 def _hard_passes(hard, method, walls, gravity, share, lanes, live):
-    """The contacts of the hard lanes, one by one: (the worst status, its lane)."""
+    """Make the contacts of the hard lanes one by one; return (the worst status, its lane)."""
     worst, where = 0, 0
     for i in range(live):
         if lanes.wall[i] <= methods.HARD:
@@ -167,14 +167,14 @@ def _hard_passes(hard, method, walls, gravity, share, lanes, live):
             if status > worst:
                 worst, where = status, i
     if worst == Status.TOO_DEEP.value:
-        # For the sentence about it.
+        # The message of the error needs them.
         put(share.state.position, 0, lanes.particle[where], lanes.lane(where).r)
         put(share.state.velocity, 0, lanes.particle[where], lanes.lane(where).v)
     return worst, where
 
 
 def _pass(method, walls, gravity, share, lanes, picked, live):
-    """A flight and a contact of every lane: (whether one has arrived, whether one is hard, whether a law was wrong)."""
+    """Fly all lanes and make their contacts; return whether (a lane has arrived, a lane is hard, a law has failed)."""
     state, watches, counters = share.state, share.watchers.of_impacts(), share.counters
     if counters is not None:
         counters.keep_before(method, gravity, lanes, live)
@@ -205,17 +205,17 @@ def _pass(method, walls, gravity, share, lanes, picked, live):
 
 
 def _count_contacts(method, share, lanes, first, after):
-    """Count what these lanes have crossed in their contacts, where contacts take time."""
+    """Count the crossings of these lanes in their contacts, where contacts take time."""
     if share.counters is not None and method.contacts_take_time:
         for i in range(index(first), index(after)):
             share.counters.count_contact(method, share, lanes, i)
 
 
 def _make_contacts(method, walls, gravity, share, lanes, picked, live):
-    """The contact of every lane: (whether one has arrived, whether one is hard)."""
+    """Make the contact of every lane; return whether (a lane has arrived, a lane is hard)."""
     some_arrived, some_hard, watches = False, False, share.watchers.of_impacts()
     at_once = method.lands and isinstance(walls, Aimed)
-    # The waves of a hit are those of its wall; a contact that looks around, or moves the hit, is asked of others too.
+    # A hit has the waves of its own wall; a contact that looks around or moves the hit needs those of all walls.
     are_known = aims(walls, gravity) and walls.inset is None and not method.looks_around
     if at_once and not are_known:
         for i in range(index(live)):
@@ -240,7 +240,7 @@ def _make_contacts(method, walls, gravity, share, lanes, picked, live):
 
 
 def _put_contact(method, lanes, i, contact):
-    """Write a contact into its lane: place, velocity, impacts, energy. Returns whether the lane has arrived."""
+    """Write the place, velocity, impacts and energy of a contact to its lane; return whether the lane has arrived."""
     lane = lanes.lane(i)
     lane.put_end(contact)
     if not counts_by_impulse(method):

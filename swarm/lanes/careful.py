@@ -1,4 +1,4 @@
-"""Particles that several walls hold, or a cusp: short steps of each, until it flies, rests or arrives."""
+"""Advance particles in a cusp or held by several walls, in short steps of each, until it flies, rests or arrives."""
 
 import numpy as np
 
@@ -18,18 +18,18 @@ from .one_by_one import one_by_one
 from .periodic import return_particle
 from .watching.crossings import ParticleMoment
 
-# Short steps of a particle in a frame: seconds.
+# The most short steps of a particle in a frame; they take seconds.
 _MOST_SHORT_STEPS = 1e7
 
 
 @long_kernel
 def careful_block(method, walls, gravity, share):
-    """A short step of each particle that several walls hold: (status, particle, drawn)."""
+    """Make a short step of each particle that several walls hold; return (status, particle, drawn)."""
     return one_by_one(CAREFUL, _take_care, (method, walls, gravity), share)
 
 
 def _take_care(method, walls, gravity, share, i):
-    """A short step of particle i; whether it moves on."""
+    """Make a short step of particle i; return whether it may take another one."""
     state, contacts, counters = share.state, share.state.contacts, share.counters
     left = contacts.remaining[i]
     before = _moment(state, i, left if left > 0.0 else share.span)
@@ -60,7 +60,7 @@ def _rest(method, walls, gravity, share, i, p, active):
         contacts.load[s, i] = active[0, s]
         state.impulse[s, i] += (active[0, s] * p.remaining + taken) * state.mass[i]
     if loses:
-        # Round-off that its walls have gathered, which nothing takes back from now on
+        # Removes the round-off that the walls have added, as nothing else will from now on.
         r = touching.inside(walls, p.r)
         put(state.position, 0, i, r)
         lose(state, i, p.twice, 2.0 * potential(gravity, r))
@@ -77,7 +77,7 @@ def _step(method, walls, gravity, share, i):
     state, contacts = share.state, share.state.contacts
     impulses = scratch((booked(walls), 1), np.float64)
     r, v, remaining = column(state.position, 0, i), column(state.velocity, 0, i), contacts.remaining[i]
-    # What is carried begins the frame so.
+    # A particle that walls carry begins the frame without a remaining time.
     remaining = remaining if remaining > 0.0 else share.span
     now = walls.at(remaining)
     if state.openings is not None:
@@ -90,7 +90,7 @@ def _step(method, walls, gravity, share, i):
     if method.laws.moving is None and events.settles(method, now, gravity, p, active):
         _rest(method, now, gravity, share, i, p, active)
         return
-    # Step by step, where places on its way are looked at.
+    # Openings and periodic cells need short steps, which look at the places on the way.
     if method.laws.moving is not None and state.openings is None and state.period is None:
         phase = carry(method, walls, gravity, state, i, p)
         if phase != NOT_CARRIED:
@@ -101,7 +101,7 @@ def _step(method, walls, gravity, share, i):
             return
     contacts.short_steps[i] += 1.0
     if state.openings is not None and square(v) > 0.0:
-        # A short step, where the places on its way are looked at.
+        # The short step looks at the places on the way.
         p = p._replace(remaining=min(remaining, 2.0 * events.GRAZING * method.size / np.sqrt(events.own_speed2(p))))
     end = events.careful(method, walls, gravity, contacts.met[i], p, impulses)
     for s in range(impulses.shape[0]):
@@ -123,7 +123,7 @@ def _step(method, walls, gravity, share, i):
 
 @outlined
 def _have_closed(walls, method, r, remaining):
-    """Whether walls that move leave no place for a particle, with so much of the frame left [s]."""
+    """Whether moving walls leave no place for a particle when `remaining` is left of the frame [s]."""
     now, deepest = walls.at(remaining), 0.0
     number = now.numbers_near(r)
     for i in range(number.size):

@@ -1,7 +1,8 @@
-"""Particles that rest in a corner of three walls, some of which move, and go with them while all three press.
+"""Carry particles that rest in a corner of three walls, some of which move, while all three walls press.
 
-Their places and velocities follow from the three walls alone, so a step may be as long as the motion of these changes
-little; the forces follow from the acceleration. Until one lets go another wall may come, and strike the particle.
+The places and velocities follow from the three walls alone. So the length of a step depends only on how fast the
+motion of the walls changes; the forces follow from the acceleration. Before one of them lets go, another wall may
+strike the particle.
 """
 
 import math
@@ -19,26 +20,26 @@ from ..kernel.vector import ZERO, Vec, absolute, cross, dot, norm, put, square, 
 
 # The phase of a particle that these walls do not carry.
 NOT_CARRIED = -1
-# Three walls hold no point where their unit normals span a volume below this.
+# Three walls hold no point if their unit normals span a volume below this.
 _FLATTEST = 1e-6
 # A relative speed below this fraction of the particle's own speed is zero if no wall loses energy.
 _NO_SPEED = 1e-13
-# Sweeps until a point is on three walls: one where they are flat.
+# Sweeps to move a point onto three walls; flat walls need one.
 _SWEEPS = 20
-# The round-off of the velocity of a corner, relative to the sum of the speeds of its walls, if these are orthogonal.
+# The round-off of the velocity of a corner, relative to the sum of the speeds of its walls, if they are orthogonal.
 _NO_SLIP = 8.0 * EPSILON
-# A step that ends where a wall does not press is tried again so much shorter; one to another wall is cut so often.
+# The factor that shortens a step after which a wall does not press, and the most cuts of a step to another wall.
 _RETRY, _MOST_TRIES = 0.25, 100
 
 
 class Corner(Record):
-    """The effect of three walls on a particle that goes with them, at one instant."""
+    """The effect of three walls on a particle that moves with them, at one instant."""
 
-    holds: bool  # whether all press
-    u: Vec  # its velocity
-    load: Vec  # how they press, per mass
-    power: Vec  # what they give by their motion, per mass
-    heat: float  # what friction takes, per mass
+    holds: bool  # whether all walls press
+    u: Vec  # velocity of the particle
+    load: Vec  # force of each wall, per mass
+    power: Vec  # power of each wall by its motion, per mass
+    heat: float  # power lost to friction, per mass
 
 
 _NONE = Corner(False, ZERO, ZERO, ZERO, 0.0)
@@ -49,13 +50,13 @@ _NO_WALLS = Three(-1.0, -1.0, -1.0)
 
 
 def _solved(a, b, c, x, y, z):
-    """The vector that has the products x, y and z with a, b and c; infinite or no number where they are in a plane."""
+    """Return the vector that has the products x, y and z with a, b and c; infinite or NaN if these are in a plane."""
     bc = cross(b, c)
     return (x * bc + y * cross(c, a) + z * cross(a, b)) / dot(a, bc)
 
 
 def _parts(a, b, c, w):
-    """The numbers with w = x a + y b + z c."""
+    """Return the coefficients (x, y, z) of w = x a + y b + z c."""
     bc = cross(b, c)
     return Vec(dot(w, bc), dot(w, cross(c, a)), dot(w, cross(a, b))) / dot(a, bc)
 
@@ -66,9 +67,9 @@ def _normals(walls, active, r):
 
 
 def _force(friction, wall, n, slip, none):
-    """The direction of the force of a wall, -(n + mu s/|s|), without its sign; a slip up to `none` is no slip.
+    """Return the direction of the force of a wall, -(n + mu s/|s|), without its sign; a slip up to `none` is zero.
 
-    A wall that the particle goes with needs no friction, since the three hold it by their normals alone.
+    A wall that moves with the particle needs no friction, since the normals of the three walls hold the particle.
     """
     if friction is None:
         return n
@@ -78,17 +79,17 @@ def _force(friction, wall, n, slip, none):
 
 @outlined
 def _corner(laws, walls, gravity, active, r, least):
-    """`Corner` of three walls at a point on them; they hold if each presses by more than `least`."""
+    """Return the `Corner` of three walls at a point on them; it holds if each wall presses by more than `least`."""
     a, b, c = _normals(walls, active, r)
     volume = abs(dot(a, cross(b, c)))
     if not volume > _FLATTEST:
         return _NONE
     v, w, x = tuple(walls.velocity(wall, r) for wall in active)
     u, pull = _solved(a, b, c, dot(a, v), dot(b, w), dot(c, x)), accelerated(gravity, ZERO, 1.0)
-    # What is left of the pull in the frame of the particle
+    # The pull that remains in the frame of the particle
     rest = _solved(a, b, c, *(walls.outward_acceleration(wall, r, u, pull) for wall in active))
     friction = laws.friction
-    # Of walls of one body all slips are round-off, which has any direction.
+    # Between walls of one body every slip is round-off, in an arbitrary direction.
     none = _NO_SLIP * (norm(v) + norm(w) + norm(x)) / volume
     slips = zip(active, (a, b, c), (u - v, u - w, u - x), strict=True)
     p, q, s = tuple(_force(friction, *one, none) for one in slips)
@@ -101,7 +102,7 @@ def _corner(laws, walls, gravity, active, r, least):
 
 @outlined
 def _find(laws, walls, gravity, r, near, least):
-    """Three walls at a point that hold a particle there, and no neighbour of them comes: `Three`."""
+    """Return `Three` walls that hold a particle at a point, from those within `near` of it, or `_NO_WALLS`."""
     number = walls.numbers_near(r)
     count = 0
     for i in range(number.size):
@@ -120,11 +121,11 @@ def _find(laws, walls, gravity, r, near, least):
 
 @outlined
 def _settled(walls, active, r):
-    """A point near three walls, moved onto them; whether it is there."""
+    """Move a point near three walls onto them; return the point and whether it is on them."""
     least = 4.0 * EPSILON * total(absolute(r))
     for _sweep in range(_SWEEPS):
         a, b, c = _normals(walls, active, r)
-        # From the walls as they go on beyond their edges: those of a mesh end in the corner.
+        # Distances to walls continued beyond their edges: the facets of a mesh end in the corner.
         d, e, f = tuple(dot(n, r - walls.project(wall, r)) for wall, n in zip(active, (a, b, c), strict=True))
         if max(abs(d), abs(e), abs(f)) <= least:
             return r, True
@@ -134,15 +135,15 @@ def _settled(walls, active, r):
 
 @outlined
 def _ahead(walls, now, active, r, u, remaining, h):
-    """A place near three walls after a time: the first one carries it, and along that it goes straight on.
+    """Return a place near three walls after a time h: the first wall carries it, and along this wall it moves straight.
 
-    Of walls of one body it is on them, however they turn.
+    If the walls belong to one body, the place is on them, however they turn.
     """
     carried = walls.during(remaining, remaining - h).carry(active.first, r)
     return carried + h * (u - now.velocity(active.first, r))
 
 
-# --- While it is carried ---------------------------------------------------------------------------------
+# --- During the motion with the walls --------------------------------------------------------------------
 
 
 @outlined
@@ -159,7 +160,7 @@ def is_carried(method, walls, gravity, p):
 
 @outlined
 def carry(method, walls, gravity, state, i, p):
-    """Carry a particle: its next phase, or `NOT_CARRIED`."""
+    """Carry a particle; return its next phase, or `NOT_CARRIED`."""
     if not is_carried(method, walls, gravity, p):
         return NOT_CARRIED
     laws, near, least = method.laws, events.TOUCH * method.size, events.weightless(method, gravity, p)
@@ -188,7 +189,7 @@ def carry(method, walls, gravity, state, i, p):
                 state.contacts.met[i] = found.wall
                 break
             if found.time < 1.0:
-                # To there, and then it is met at once.
+                # Ends the step where the other wall is, which the particle then meets at once.
                 h *= found.time
                 tries += 1
                 continue
@@ -209,7 +210,7 @@ def carry(method, walls, gravity, state, i, p):
 
 @outlined
 def _stop(now, gravity, state, i, p, active, u):
-    """Book what the walls take of a velocity that is not theirs."""
+    """Book the impulses and the energy with which the walls stop a velocity relative to them."""
     a, b, c = _normals(now, active, p.r)
     taken, mass = _parts(a, b, c, p.v - u), state.mass[i]
     given = _push(now, state, i, active, taken, Vec(
@@ -222,7 +223,7 @@ def _stop(now, gravity, state, i, p, active, u):
 
 @outlined
 def _book(walls, gravity, state, i, active, corners, end):
-    """Book a step, by Simpson's rule; `end` is (where it ends, how long it is, whether the frame ends with it)."""
+    """Book a step by Simpson's rule; `end` is (place at its end, length, whether the frame ends with it)."""
     start, half, last = corners
     r1, h, _ends = end
     sixth = h * (1.0 / 6.0)
@@ -230,7 +231,7 @@ def _book(walls, gravity, state, i, active, corners, end):
     work = sixth * (start.power + 4.0 * half.power + last.power)
     heat = sixth * (start.heat + 4.0 * half.heat + last.heat)
     after = 0.5 * square(last.u) + potential(gravity, r1)
-    # The energy is known to more digits than what the walls give of it: the one that gives most has the rest.
+    # The energy has more digits than the work of the walls: the wall with the most work takes the remainder.
     rest = after - state.energy[i] + heat - (work.x + work.y + work.z)
     x, y, z = abs(work.x), abs(work.y), abs(work.z)
     first, second = (x >= y) & (x >= z), (y > x) & (y >= z)
@@ -242,7 +243,7 @@ def _book(walls, gravity, state, i, active, corners, end):
 
 @outlined
 def _push(walls, state, i, active, load, work):
-    """Book impulses and works per mass of three walls; the sum of the works."""
+    """Book impulses and works per mass of three walls; return the sum of the works."""
     behind, mass = walls.length(), state.mass[i]
     for wall, given, done in zip(active, load, work, strict=True):
         row = walls.row(wall)

@@ -1,16 +1,16 @@
-"""Laws of walls in methods with contacts that take time: they act where a contact ends.
+"""Laws of walls in methods with contacts that take time: a law acts where a contact ends.
 
 Over its steps the contact has reversed the normal velocity of the particle, as a wall without laws does. The laws then
 act as at an impact on a rigid wall at which the particle arrives with that velocity reversed again. So restitution,
 temperatures and all other laws, and the energy that they take, are those of `Impact` for any penalty. Friction is
-Coulomb's, with the whole impulse of the contact, also the part that carries a weight.
+Coulomb's, with the whole impulse of the contact, including the part that carries a weight.
 
-In an edge another wall may have given some of the speed away b. After an arrival with the speed a the impulses of this
-wall, I, and of others, O, leave b = I + O - a. So of b this wall has given no more than
+In an edge another wall may have given a part of the speed away b. After an arrival with the speed a the impulses of
+this wall, I, and of other walls, O, leave b = I + O - a. So this wall has given at most
     c = min(b, I),                                                                                        (1)
-and its laws act as at a rigid wall that goes away with x = b - c, at which the particle arrives with c. With
+of b, and its laws act as at a rigid wall that goes away with x = b - c, at which the particle arrives with c. With
 v = v' - x n the energy |v|^2 changes by
-    -2 x n.dv                                                                                             (2)
+        -2 x n.dv                                                                                             (2)
 more than |v'|^2. The impulse is I - 2 c + (c + c'), where c' is the speed away that the laws leave: it never pulls.
 """
 
@@ -28,19 +28,19 @@ from .accounts import add_work
 from .escape import cut_contact, detain, foot_on, leave_contacts, wall_of_row
 from .watching.log import Struck
 
-# Of its speed before a step, what friction leaves by round-off of a particle that it stops.
+# The fraction of its speed before a step that round-off leaves to a particle that friction stops.
 _STOPPED = 1e-9
 
 
 def counts_by_impulse(method):
-    """Whether a contact counts as an impact where its impulse begins; else its method says so, by the gap."""
+    """Whether a contact counts as an impact when its impulse begins; otherwise the method decides, from the gap."""
     return method.steps_into_walls and method.laws_at_ends is not None
 
 
 def end_contacts(method, walls, gravity, share, lanes, i, before, pushed):
-    """Add what a wall (number, impulse per mass) has given a lane in a step, and let its laws act at the contact's end.
+    """Add the impulse of a wall, `pushed` = (wall, impulse per mass), to a lane; apply its laws if the contact ends.
 
-    The velocity `before` is that at the start of the step.
+    `before` is the velocity at the start of the step.
     """
     if method.laws_at_ends is None:
         return
@@ -55,7 +55,7 @@ def end_contacts(method, walls, gravity, share, lanes, i, before, pushed):
 
 
 def impulses_before(method, walls, lanes, i):
-    """The impulses of the walls on a lane before its hard pass."""
+    """Return the impulses of the walls on a lane before its hard pass."""
     if method.laws_at_ends is None and not method.steps_into_walls:
         return None
     kept = scratch(walls.length(), np.float64)
@@ -85,14 +85,14 @@ def count_hard_contacts(method, walls, share, lanes, i, start, kept):
 
 
 def end_hard_contacts(method, walls, gravity, share, lanes, i, before, kept):
-    """`end_contacts` with all walls after a hard pass."""
+    """Call `end_contacts` for all walls after a hard pass."""
     if method.laws_at_ends is None:
         return
     state, p = share.state, index(lanes.particle[i])
     for s in range(walls.length()):
         state.pressed[s, p] += lanes.impulse[s, i] - kept[s]
     for s in range(walls.length()):
-        # One that absorbs the particle ends its other contacts.
+        # A wall that absorbs the particle ends its other contacts.
         if _lasts(state, s, p):
             _end(method, walls, gravity, share, lanes, i, before, wall_of_row(walls, s, lanes.lane(i).r))
 
@@ -112,8 +112,8 @@ def _end(method, walls, gravity, share, lanes, i, before, wall):
     away, pressed = -dot(relative(u, v), n), state.pressed[row, p]
     if method.is_outside(now, wall, flier.r):
         if away <= _STOPPED * norm(before) and dot(relative(u, before), n) < 0.0:
-            # In a contact that a weight makes last, friction acts each time that the particle turns back, and where
-            # friction at another wall stops it.
+            # If a weight makes the contact last, friction acts each time the particle turns back, and where friction at
+            # another wall stops the particle.
             state.rubbed[row, p] += pressed
             state.pressed[row, p] = 0.0
             _drag(method, walls, share, lanes, i, (wall, n, u, pressed))
@@ -153,7 +153,7 @@ def _act(method, walls, now, gravity, share, lanes, i, at):
     wall, r, n, _u, b, _pressed, impulse = at
     flier, p, laws = lanes.lane(i), index(lanes.particle[i]), method.laws_at_ends
     time, mass = share.moment - method.seconds(flier.remaining), share.state.mass[p]
-    # As it would arrive at a rigid wall, (1)
+    # The arrival at a rigid wall, (1)
     c = min(b, impulse)
     before = flier.v + 2.0 * c * n
     if laws.loses or laws.send_off:
@@ -164,16 +164,16 @@ def _act(method, walls, now, gravity, share, lanes, i, at):
 
 
 def _send(method, walls, now, gravity, share, lanes, i, at):
-    """Let the laws act: the impulse per mass of a rigid wall."""
+    """Apply the laws of an impact; return the impulse per mass of a rigid wall."""
     wall, r, n, u, b, pressed, impulse = at
     state, flier, p, laws = share.state, lanes.lane(i), index(lanes.particle[i]), method.laws_at_ends
     c, v, mass = min(b, impulse), flier.v, state.mass[p]
     x = b - c
-    # v' of (2) and its arrival
+    # v' of (2), and the velocity of its arrival
     apart = v + x * n
     before = apart + 2.0 * c * n
     turned = given(u, apart - before)
-    # Of the contacts that have ended before this one: all that were counted but this one and those that last.
+    # The number of contacts that ended before this one: all counted ones without this one and those that last.
     number = state.impacts[p] + np.int64(flier.hits) - 1
     for s in range(walls.length()):
         number -= np.int64(_lasts(state, s, p))
@@ -182,7 +182,7 @@ def _send(method, walls, now, gravity, share, lanes, i, at):
     bounce = impact_on_wall(laws._replace(friction=None), now, gravity, wall, arriving, random)
     bounce = _rubbed(laws, wall, n, u, bounce, max(pressed + (bounce.impulse - 2.0 * c), 0.0))
     bounce = _put_back(laws, bounce, x, n, apart)
-    # Of the velocities themselves: what a step is to keep is known to round-off.
+    # From the velocities: the energy that a step must keep has round-off.
     change = square(bounce.v) - square(v)
     flier.v = bounce.v
     flier.twice += change
@@ -200,7 +200,7 @@ def _send(method, walls, now, gravity, share, lanes, i, at):
 
 
 def _put_back(laws, bounce, x, n, apart):
-    """A `Bounce` with the speed away x that others have given; (2) is lost, or heat of the law that has acted."""
+    """Add the speed away x, given by other walls, to a `Bounce`; (2) is lost, or heat of the law that has acted."""
     more = -2.0 * x * dot(n, bounce.v - apart)
     is_heat = bounce.is_sent & (bounce.heat != 0.0 if laws.may_dissipate else laws.give_heat)
     lost, heat = bounce.lost - select(is_heat, 0.0, more), bounce.heat + select(is_heat, more, 0.0)
@@ -208,7 +208,7 @@ def _put_back(laws, bounce, x, n, apart):
 
 
 def _rubbed(laws, wall, n, u, bounce, impulse):
-    """A `Bounce` less what friction takes of the slip, but of what a law has sent off."""
+    """Subtract from a `Bounce` what friction takes from the slip, unless a law has sent the particle off."""
     if laws.friction is None or bounce.is_sent:
         return bounce
     w = relative(u, bounce.v)
@@ -221,11 +221,11 @@ def _rubbed(laws, wall, n, u, bounce, impulse):
 
 
 def _keep(method, walls, share, lanes, i, wall, wait):
-    """A lane waits on a wall for whole steps, or is absorbed by it."""
+    """Let a lane wait on a wall for whole steps, or be absorbed by it."""
     flier, p = lanes.lane(i), index(lanes.particle[i])
     if method.steps_into_walls and wait < math.inf:
         wait = math.ceil(wait / method.dt) * method.dt
-    # Another wall may let it wait beyond the frame already.
+    # Another wall may keep it waiting beyond the end of the frame already.
     wait += max(share.state.starts[p] - share.moment, 0.0)
     if detain(share, p, wall, method.seconds(flier.remaining), wait):
         flier.remaining = flier.remaining - (wait / method.dt if method.steps_into_walls else wait)

@@ -1,4 +1,4 @@
-"""Particles at a wall where their contact lasts, or that they meet while they slide: what becomes of each."""
+"""Decide how particles go on that meet a wall while they slide, or at a wall where their contact lasts."""
 
 import math
 
@@ -21,21 +21,21 @@ from .lane_arrays import speed2_scale
 from .one_by_one import one_by_one
 from .watching.log import Struck
 
-# A particle that meets walls so often and does not move on is left to the careful way, and then given up.
+# A particle that meets walls this often without moving on is left to the careful way, and later given up.
 _OFTEN, _MOST = 64.0, 1e6
-# It has moved on after this part of a crossing.
+# A particle moves on if it advances by this fraction of a crossing.
 _MOVED = 1e-9
 
 
 @long_kernel
 def meet_block(method, walls, gravity, share):
-    """Decide for the particles that a thread draws: (status, particle, drawn); LOG_FULL: call it again."""
+    """Decide for the particles that a thread draws; return (status, particle, drawn). After LOG_FULL call it again."""
     return one_by_one(EVENT, _decide, (method, walls, gravity), share)
 
 
 @outlined
 def _decide(method, walls, gravity, share, i):
-    """Decide whether particle i goes on along its walls, or flies; whether it moves on."""
+    """Decide whether particle i goes on along its walls or flies; return whether it makes progress."""
     state, contacts = share.state, share.state.contacts
     r, v, remaining = column(state.position, 0, i), column(state.velocity, 0, i), contacts.remaining[i]
     carried, walls = walls, walls.at(remaining)
@@ -80,7 +80,7 @@ def _decide(method, walls, gravity, share, i):
     _settle(walls, state, i, found)
     put(state.velocity, 0, i, v)
     contacts.keep[i] = found.keep
-    # The step of before is a good first one where the walls are the same.
+    # The last step is a good first one if the walls are the same.
     same = found.wall == first and found.other == second
     contacts.step[i] = contacts.step[i] if same else 0.0
     contacts.walls[0, i] = found.wall if slides else -1.0
@@ -91,16 +91,16 @@ def _decide(method, walls, gravity, share, i):
 
 
 def _settle(walls, state, i, found):
-    """A particle that begins to slide, on its wall again: where rooms touch what meets one is put inside of it."""
+    """Put a particle that begins to slide back onto its wall: where rooms touch, a hit is put inside of its room."""
     if walls.inset is not None and (found.phase == HELD or found.phase == EDGE):
         put(state.position, 0, i, walls.project(found.wall, column(state.position, 0, i)))
 
 
 @outlined
 def _let_out(method, walls, gravity, share, i, r, v, remaining):
-    """Whether particle i has escaped, since the wall that it has met is open there."""
+    """Let particle i out if the wall that it has met is open there; return whether it was let out."""
     openings, met, near = share.state.openings, share.state.contacts.met, crossing.near(method, r)
-    # Where this one is open, a closed one at the same place.
+    # Replaces an open wall by a closed wall at the same place.
     met[i] = hit_wall(openings, method, walls, (r, v), met[i], near)
     if not lets_through(openings, walls, met[i], r, near):
         return False
@@ -110,19 +110,19 @@ def _let_out(method, walls, gravity, share, i, r, v, remaining):
 
 @outlined
 def _send_off(method, walls, gravity, share, i):
-    """Whether a law of the wall that a sliding particle meets sends it off: then it flies, or is absorbed."""
+    """Let a law of the wall that a sliding particle meets send it off, to fly or be absorbed; return whether it did."""
     state, contacts, laws = share.state, share.state.contacts, method.laws
     wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)
     remaining = contacts.remaining[i]
     now, mass = walls.at(remaining), state.mass[i]
     random = RandomSource(share.seed, share.first).of_impact(i, state.impacts[i], laws)
-    # What slides along another wall meets it without end: the surface's restitution and an edge are for slow impacts.
+    # A particle that slides along another wall meets this one without end: restitution and edges are for slow impacts.
     slow = events.GRAZING * np.sqrt(max(speed2_scale(state, i), square(v)))
     happens, sent = by_law(laws, now, gravity, wall, Arriving(r, v, 2.0 * state.energy[i], mass, slow), random)
     if not happens:
         return False
     if laws.own is not None and math.isnan(sent.v.x):
-        # The test of whether the particle goes on finds this NaN.
+        # The test whether the particle goes on finds this NaN.
         contacts.keep[i] = math.nan
         return True
     heat = book_impact(laws, state, (walls.row(wall), i, i), mass, sent)
@@ -143,7 +143,7 @@ def _send_off(method, walls, gravity, share, i):
 
 @outlined
 def _spare(moving, walls, state, i, found, wall):
-    """Book how much less its walls give particle i, which chatters, than one that has no speed across them."""
+    """Book the difference of the impulses on particle i, which chatters, from those on one without normal speed."""
     r, v = column(state.position, 0, i), column(state.velocity, 0, i)
     turned = v - found.impulse * walls.unit_normal(wall, r)
     if found.phase == HELD:

@@ -1,4 +1,4 @@
-"""The ends of particles that reach a wall where it is open, or that absorbs or detains them."""
+"""The ends of particles at walls that are open there, or that absorb or detain them."""
 
 import math
 
@@ -18,12 +18,12 @@ from .table import marked_lanes
 from .watching.crossings import ParticleMoment
 from .watching.log import Struck
 
-# Newton steps onto a wall, from the end of a step.
+# Newton steps from the end of a step onto a wall.
 _SWEEPS = 5
 
 
 def escape(share, p, wall, r, v, remaining):
-    """Book that particle p escapes with so much of its frame left; it keeps its place and velocity."""
+    """Book that particle p escapes when `remaining` is left of its frame; it keeps its place and velocity."""
     share.state.escape_time[p] = share.moment - remaining
     if share.counters is not None:
         share.counters.settle(share, p, ParticleMoment(r, v, remaining))
@@ -31,13 +31,13 @@ def escape(share, p, wall, r, v, remaining):
 
 
 def absorb(share, p, wall, remaining):
-    """Book that a wall absorbs particle p with so much of its frame left; it keeps its place and velocity."""
+    """Book that a wall absorbs particle p when `remaining` is left of its frame; it keeps its place and velocity."""
     absorbed = share.state.absorbed
     absorbed.time[p], absorbed.wall[p] = share.moment - remaining, np.int32(wall)
 
 
 def detain(share, p, wall, remaining, wait):
-    """Whether particle p goes on in this frame after a wait at a wall; else book its absorption or its later start."""
+    """Return whether particle p goes on in this frame after a wait at a wall, or book its absorption or later start."""
     if wait < remaining:
         return True
     if wait == math.inf:
@@ -48,7 +48,7 @@ def detain(share, p, wall, remaining, wait):
 
 
 def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
-    """Let lanes out that have flown to a wall where it is open, if no closed wall is at the same place.
+    """Let lanes out that have flown to an open wall, if no closed wall is at the same place.
 
     A lane with another room behind the wall goes into that room, and its flight goes on in the next pass.
     """
@@ -71,7 +71,7 @@ def let_out_lanes(openings, method, walls, gravity, share, lanes, live):
 
 
 def _escape_lane(share, lanes, i, wall, remaining):
-    """Book that a lane escapes with so much of its frame left [s], and end this."""
+    """End the frame of a lane that escapes when `remaining` is left of it [s], and book the escape."""
     flier, p, counters = lanes.lane(i), index(lanes.particle[i]), share.counters
     if counters is not None:
         counters.retire(share.state, lanes, p, i)
@@ -85,7 +85,7 @@ def _escape_lane(share, lanes, i, wall, remaining):
 
 
 def face_lanes(openings, method, walls, gravity, share, lanes, live):
-    """Set which walls are open to each lane in its step: those open at its foot on them at the start of the step."""
+    """Set the walls that are open to each lane in its step: those open at its foot on them at the start of the step."""
     for i in range(index(live)):
         for k, _wall in enumerate(walls.each):
             lanes.stand[k, i] = 1.0
@@ -116,12 +116,12 @@ def _lose(method, share, lanes, i, lost):
     lane = lanes.lane(i)
     lane.twice -= 2.0 * lost / state.mass[p]
     if not method.dissipates:
-        # Else it is booked with the work of the walls, where the lane retires.
+        # Otherwise the energy is booked with the work of the walls, when the lane retires.
         state.energy[p] -= lost / state.mass[p]
 
 
 def step_out_lanes(method, walls, share, lanes, live):
-    """Let lanes out that have stepped through an open wall; whether there was one."""
+    """Let lanes out that have stepped through an open wall; return whether there was one."""
     found = False
     if lanes.stand is None:
         return found
@@ -134,7 +134,7 @@ def step_out_lanes(method, walls, share, lanes, live):
 
 @outlined
 def step_out(method, walls, share, lanes, i):
-    """Let a lane out if it has stepped through an open wall; whether it has. Energy stored in other walls is lost."""
+    """Let a lane out if it has stepped through an open wall; lose energy stored in others; return whether it has."""
     flier, out = lanes.lane(i), -1.0
     for k, wall in enumerate(method.at_start(walls, flier.remaining).each):
         if lanes.stand[k, i] == 0.0 and wall.level_of(wall.inner(flier.r)) > 0.0:
@@ -152,7 +152,7 @@ def step_out(method, walls, share, lanes, i):
 
 @outlined
 def leave_contacts(method, walls, share, lanes, i):
-    """End the contacts of a lane that leaves: what they store is lost, and each has a row in the log."""
+    """End the contacts of a lane that leaves: their stored energy is lost, and each contact has a row in the log."""
     now, r = method.at_start(lanes.faced(walls, i), lanes.lane(i).remaining), lanes.lane(i).r
     _lose(method, share, lanes, i, contact_energy(method.law, now, 1.0, r))
     if method.laws_at_ends is not None:
@@ -162,7 +162,7 @@ def leave_contacts(method, walls, share, lanes, i):
 
 @outlined
 def cut_contact(method, now, share, lanes, i, row):
-    """End a contact without its laws, at a wall that is open there or where the lane leaves."""
+    """End a contact without its laws, at a wall that is open there or when the lane leaves."""
     state, lane, p = share.state, lanes.lane(i), lanes.particle[i]
     if share.log is not None:
         time = share.moment - method.seconds(lane.remaining)
@@ -171,7 +171,7 @@ def cut_contact(method, now, share, lanes, i, row):
 
 
 def log_cut_contact(log, laws, now, state, row, at):
-    """A row for a contact that laws do not end, with its impulse so far; `at` is (particle, place, velocity, time)."""
+    """Log a contact that laws do not end, with its impulse so far; `at` is (particle, place, velocity, time)."""
     p, r, v, time = at
     i = index(p)
     impulse = (state.pressed[row, i] + state.rubbed[row, i]) * state.mass[i]
@@ -181,14 +181,14 @@ def log_cut_contact(log, laws, now, state, row, at):
 
 
 def foot_on(now, wall, r):
-    """The place on a wall that a point near it is in contact with: some walls have exact normals on the wall only."""
+    """Return the contact point on a wall of a point near it: some walls have exact normals only on the wall."""
     for _sweep in range(_SWEEPS):
         r = now.project(wall, r)
     return r
 
 
 def wall_of_row(walls, row, r):
-    """The wall of a row; in a field the member that a point is deepest in, or nearest to."""
+    """Return the wall of a row; in a field the member that the point is deepest in, or nearest to."""
     if len(walls.fields()) == 0:
         return float(row)
     return _deepest_of_row(walls, row, r)
@@ -209,7 +209,7 @@ def _deepest_of_row(walls, row, r):
 
 @outlined
 def is_at_opening(slide, now, i):
-    """Whether a lane that slides is where a wall that holds it is open; then it is put there as after a flight."""
+    """Whether a wall that holds a sliding lane is open there; then set the lane to meet it as after a flight."""
     lanes, lane = slide.lanes, slide.lanes.lane(i)
     near = crossing.near(slide.method, lane.r)
     wall = open_wall_of(lanes.openings, slide.method, now, slide.active(lane), lane.r, near)

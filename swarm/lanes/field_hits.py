@@ -1,7 +1,7 @@
-"""The first hits of all lanes where walls are bodies of a field: each lane looks at the bodies of its cell.
+"""Find the first hits of all lanes with the bodies of fields: each lane looks at the bodies of its cell.
 
-The loops write to arrays on the stack. For any other array the compiler cannot prove that it does not overlap the
-tables of the bodies, and then it vectorises nothing.
+The loops write to arrays on the stack. Of any other array the compiler cannot prove that it does not overlap the
+tables of the bodies, and then it does not vectorise.
 """
 
 from typing import Any
@@ -24,57 +24,57 @@ from .from_cell_to_cell import go_through
 from .lane_arrays import Flying
 from .table import STRIDE, marked_lanes
 
-# Safe steps are for all lanes where more than this part of them needs one.
+# All lanes take a safe step together if more than one in this number needs it.
 _MANY = 8
-# The flight of a lane, in rows of `course`: when it ends, and at which wall, or -1.
+# The flight of a lane, in rows of `course`: the time of its end, and the wall there, or -1.
 _TIME, _WALL = 0, 1
 
 
 class LaneFlights(Record):
-    """The flights of lanes as far as they are known, and the bodies near them."""
+    """The known parts of the flights of lanes, and the bodies near them."""
 
-    owner: Array  # int64, the body that each belongs to
-    time: Array  # when the flight ends
-    wall: Array  # where, or -1
+    owner: Array  # int64, the lane that each flight belongs to
+    time: Array  # the end of the flight
+    wall: Array  # the wall there, or -1
     first: Array  # int64, the first entry of the cell
-    number: Array  # int64, how many it has
+    number: Array  # int64, the number of entries of the cell
     which: Array  # the number of body k
-    body: Array  # (stride, width), its numbers
+    body: Array  # (stride, width), the row of body k in the table
 
     def give_back(self, lanes, i):
-        """Keep the hit that a lane has found."""
+        """Write the hit of a flight back to its lane."""
         owner = index(self.owner[i])
         lanes.course[_TIME, owner], lanes.course[_WALL, owner] = self.time[i], self.wall[i]
 
 
 class MemberLook(Record):
-    """A look of all lanes at the next of the bodies in their cells."""
+    """A look of all lanes at body k of their cells."""
 
     seen: LaneFlights
-    like: Any  # a body
+    like: Any  # a body of the field
     gravity: Any
     lanes: Any
-    before: Any  # how many walls are before these bodies
-    k: int  # which bodies of the cells they are
-    row: int  # of `lanes.rows`, from which on the flights are
+    before: Any  # the number of walls before these bodies
+    k: int  # the place of the bodies in their cells
+    row: int  # the first row of the flights in `lanes.rows`
 
     def flight(self, i):
-        """The position and the velocity of a lane."""
+        """Return the position and the velocity of a lane."""
         return column(self.lanes.rows, index(self.row), i), column(self.lanes.rows, index(self.row + 3), i)
 
     def one(self, i):
-        """The body of a lane, as a scene of one wall."""
+        """Return the body of a lane, as a scene of one wall."""
         return Walls((gathered(self.like, self.seen.body, i, 0),))
 
     def take(self, i, time, wall):
-        """A hit of a lane with its body, if there is one and it is the first so far."""
+        """Take a hit of a lane with its body, if the lane has such a body and the hit is the first so far."""
         seen = self.seen
         sooner = (self.k < seen.number[i]) & (time < seen.time[i])
         seen.time[i] = select(sooner, time, seen.time[i])
         seen.wall[i] = select(sooner, wall, seen.wall[i])
 
     def step(self, course, i):
-        """A safe step of a lane."""
+        """Make a safe step of a lane."""
         flights.step(self.one(i), self.gravity, course, 0, i, *self.flight(i))
 
     def goes_on(self, course, i):
@@ -84,7 +84,7 @@ class MemberLook(Record):
 
     @outlined
     def go_on(self, course, i, steps):
-        """So many more steps of one lane, if need be."""
+        """Make up to `steps` safe steps of one lane, while they may find a hit."""
         for _step in range(steps):
             self.step(course, i)
             if not self.goes_on(course, i):
@@ -92,24 +92,24 @@ class MemberLook(Record):
 
 
 def keep_hit(lanes, i, hit, before):
-    """Keep the `Hit` that was found for a lane, with a wall that has so many walls before it."""
+    """Keep the `Hit` of a lane with walls that have `before` walls before them."""
     lanes.course[_TIME, i], lanes.course[_WALL, i] = hit.time, select(hit.wall < 0.0, -1.0, hit.wall + before)
 
 
 def hit_of_lane(lanes, i):
-    """The `Hit` that was found for a lane."""
+    """Return the `Hit` that was found for a lane."""
     return flights.Hit(lanes.course[_TIME, i], lanes.course[_WALL, i])
 
 
 def seek(walls, gravity, lanes, live):
-    """The first hits of every live lane with the fields, or one found."""
+    """Find the first hit of every live lane with the fields, unless its hit so far is earlier."""
     for before, field in reversed(walls.fields()):
         _seek(gravity, field.members, before, lanes, live)
 
 
 @outlined
 def _seek(gravity, members, before, lanes, live):
-    """The same with one field that has so many walls before it."""
+    """Find the first hits with one field that has `before` walls before it, as `seek`."""
     if isinstance(members, Facets):
         go_through(gravity, members, before, lanes, live)
     elif isinstance(members, Foam):
@@ -121,7 +121,7 @@ def _seek(gravity, members, before, lanes, live):
 
 
 def _ask_for_each(gravity, members, before, lanes, live):
-    """The hit of every lane by itself, as a whole."""
+    """Find the hit of each lane with the field as a whole."""
     for i in range(index(live)):
         lane, found = lanes.lane(i), hit_of_lane(lanes, i)
         hit = flights.soonest(members.field_hit(gravity, lane.r, lane.v), before, found)
@@ -129,7 +129,7 @@ def _ask_for_each(gravity, members, before, lanes, live):
 
 
 def _look_at_all(members, before, lanes, live):
-    """Every lane with a straight flight, at all bodies of a field."""
+    """Find the first hits of straight flights of all lanes with all bodies of a field."""
     course = lanes.course
     for m in range(members.table.shape[0]):
         body, number = member(members, index(m)), before + m
@@ -142,7 +142,7 @@ def _look_at_all(members, before, lanes, live):
 
 
 def _look_at_near(gravity, members, before, lanes, live):
-    """Every lane at the bodies near it: those in its cell, or all."""
+    """Find the first hits of all lanes with the bodies near them: the bodies of the cell, or all."""
     course, grid, columns = lanes.course, members.grid, width(members.like)
     seen = LaneFlights(
         unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
@@ -171,30 +171,30 @@ def _look_at_near(gravity, members, before, lanes, live):
 
 
 def _find_near(members, gravity, lanes, live, seen):
-    """Which bodies are near each lane, and until when it knows that."""
+    """Find the bodies near each lane, and the time for which they are known."""
     grid = members.grid
     for i in range(index(live)):
         lane = lanes.lane(i)
         r, v = lane.r, lane.v
         cell = cell_of(grid, r)
         until = until_next(gravity, grid, cell, r, v)
-        # Bodies are known twice the margin beyond the cell's wall, and a flight ends one beyond it.
+        # A cell lists the bodies up to twice the margin beyond its wall, and a flight ends one margin beyond it.
         until = on_time(lanes.period, gravity, (r, v), lane.remaining, until, 0.5 * grid.margin)
         sooner = until < seen.time[i]
         seen.time[i] = select(sooner, until, seen.time[i])
         seen.wall[i] = select(sooner, -1.0, seen.wall[i])
         seen.number[i] = cell.number
-    # In a loop of their own: in that one they take twice as long.
+    # In a separate loop: in the loop above they take twice as long.
     for i in range(index(live)):
         first, stop = entries_of(grid, seen.number[i])
         seen.first[i], seen.number[i] = first, stop - first
 
 
 def _close_up(seen, k, lanes, n, row):
-    """Give back the lanes that have no body k, where these are most, and close up the others: how many there are.
+    """Give back the lanes without a body k if these are most, close up the others, and return the number of lanes left.
 
-    Among 1000 balls at random, 3.6 in a cell and 11 in the fullest, an impact takes a fifth longer without. (Lanes one
-    by one where few are left are no faster, and one more loop to compile.)
+    Without this an impact among 1000 balls at random, 3.6 in a cell and 11 in the fullest, takes a fifth longer. (Lanes
+    one by one when few are left are no faster, and one more loop to compile.)
     """
     some, j = 0, index(0)
     for i in range(index(n)):
@@ -213,7 +213,7 @@ def _close_up(seen, k, lanes, n, row):
 
 
 def _look(look, live):
-    """Every lane at its body: in closed form where flights are straight and none is met by steps."""
+    """Find the hits of all lanes with their bodies, in closed form or by steps."""
     if look.gravity is None and not look.like.in_steps:
         seen = look.seen
         for i in range(index(live)):
@@ -224,7 +224,7 @@ def _look(look, live):
 
 
 def _look_by_steps(look, live):
-    """The same by safe steps."""
+    """Find the hits of all lanes with their bodies by safe steps."""
     marked, order, course = look.lanes.marked, look.lanes.order, unwritten((flights.COURSE, STRIDE), np.float64)
     for i in range(index(live)):
         flights.begin(look.one(i), look.gravity, course, 0, i, *look.flight(i))

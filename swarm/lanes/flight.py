@@ -1,4 +1,4 @@
-"""The flight of every lane of a block to its next contact, or to the end of the frame."""
+"""Fly every lane of a block to its next contact, or to the end of the frame."""
 
 import numpy as np
 
@@ -17,9 +17,9 @@ from .lane_arrays import Flying
 from .periodic import cut_steps
 from .table import STRIDE, LaneView, Rows, copy_lane, marked_lanes, whole_eights
 
-# After the first safe step to walls in any motion all lanes take so many more in a pass.
+# The number of further safe steps that all lanes take in a pass after the first one to walls in any motion.
 _STRIDES = 3
-# Guesses are improved in all lanes together if at least one lane in so many needs it; flights are looked at so.
+# All lanes improve guesses together if at least one in _MANY needs it, and look together if one in _LOOK does.
 _MANY, _LOOK = 8, 4
 
 
@@ -27,7 +27,7 @@ _named = Rows()
 
 
 class Open(LaneView):
-    """A lane without a proven hit: where it starts, and how much of the frame is left."""
+    """A lane without a proven hit: its start, and the time left of the frame."""
 
     r, v, remaining = _named.vector(), _named.vector(), _named.number()
     COUNT = _named.count
@@ -36,11 +36,11 @@ class Open(LaneView):
 def go(method, walls, gravity, lanes, live):
     """Fly every lane to its next contact, or to the end of the frame.
 
-    A shorter loop has more lanes under way in a processor, a longer one writes less. Measured in a sphere, nanoseconds
-    an impact: first hit, flight and contact in one loop 7.2, a loop for each 5.2; now that there is less to do, flight
+    A shorter loop has more lanes under way in a processor, a longer loop writes less. Measured in a sphere, nanoseconds
+    an impact: first hit, flight and contact in one loop 7.2, a loop for each 5.2; with fewer operations now, flight
     and contact in one loop 3.6, first hit and flight 3.3 (an ellipsoid 4.4, 3.9). The safe steps of a fall in one loop
-    110, a loop for each 35. (With |v|^2 and 1/|v|^2 kept a lane no less, and their round-off is that of every flight of
-    a particle: the angular momentum in a sphere drifted five times as fast.)
+    110, a loop for each 35. (To keep |v|^2 and 1/|v|^2 of a lane saves nothing, and their round-off is the same in each
+    flight of a particle: the angular momentum in a sphere drifted five times as fast.)
     """
     met = method.landed_on(walls)
     if method.steps_into_walls and walls.accelerate:
@@ -52,9 +52,9 @@ def go(method, walls, gravity, lanes, live):
 
 
 def _step_off(method, walls, gravity, lanes, live):
-    """Lanes that step into walls in any motion: the free steps of those that touch no wall now.
+    """Fly the lanes that step into walls in any motion and touch no wall now, by free steps.
 
-    Most lanes are in a contact, of which the next step needs no safe step. Asked of all lanes these were more than half
+    Most lanes are in a contact, and its next step needs no safe step. Safe steps of all lanes were more than half
     of the time, in a sphere that is carried along a circle as in a box that turns.
     """
     for i in range(index(live)):
@@ -66,9 +66,9 @@ def _step_off(method, walls, gravity, lanes, live):
 
 @outlined
 def _fly_beside(method, walls, gravity, lanes, some):
-    """The flights of so many lanes, those in `lanes.order`, side by side in a table of their own.
+    """Fly the first `some` lanes of `lanes.order`, side by side in a table of their own.
 
-    To walls of which lanes find the first hit together these are known: one safe step of each wall by itself ended far
+    First hits of all lanes with their walls are found together: one safe step of each wall by itself ended far
     from most, and took half of the time of all steps into walls that turn.
     """
     beside = lanes._replace(
@@ -79,7 +79,7 @@ def _fly_beside(method, walls, gravity, lanes, some):
         copy_lane(lanes.rows, index(lanes.order[k]), beside.rows, k, Flying.ROWS)
     if isinstance(walls, Strided):
         for k in range(index(some)):
-            # The search counts what is left of a frame in seconds.
+            # The search measures the time left of a frame in seconds.
             lane = beside.lane(k)
             lane.remaining = method.seconds(lane.remaining)
         _stride(walls, gravity, beside, some)
@@ -113,7 +113,7 @@ def _search(met, walls, gravity, lanes, live):
 
 
 def _first_hit(met, walls, gravity, lane, lanes, i):
-    """The first hit of a lane with the walls that the method lands on; None where it lands on none."""
+    """Return the first hit of a lane with the walls that the method lands on; None if it lands on none."""
     if met is None:
         return None
     if not met.each:
@@ -159,12 +159,12 @@ def _is_closed(gravity, walls):
 
 def aims(walls, gravity):
     """Whether first hits with walls in any motion are guessed and proven."""
-    # A fall that walls often come near to is proven too seldom: in a box that shakes it took half as long again.
+    # For falls past walls proofs fail too often: in a box that shakes they took half as long again.
     return gravity is None and isinstance(walls, Aimed)
 
 
 def _stride(walls, gravity, lanes, live):
-    """Safe steps of all lanes to walls in any motion."""
+    """Make safe steps of all lanes to walls in any motion."""
     if aims(walls, gravity):
         _stride_open(walls, gravity, lanes, _aim_at_moving(walls, gravity, lanes, live))
         return
@@ -175,11 +175,11 @@ def _stride(walls, gravity, lanes, live):
 
 
 def _aim_at_moving(walls, gravity, lanes, live):
-    """The proven hits of all lanes with walls in any motion; the number of those without, which are in `lanes.order`.
+    """Prove the hits of lanes with walls in any motion; return the number of the others, which are in `lanes.order`.
 
-    Those go on by one safe step, and aim again in the next pass. Each loop is short: a processor holds some hundred
-    operations that wait for a sine, a root or a quotient, and begins no other lane while they are those of two.
-    (Measured in a box that turns: levels, their root, bounds and the proof in one loop 1.2 of the time.)
+    The others take one safe step, and aim again in the next pass. Each loop is short: a processor holds some hundred
+    operations that wait for a sine, a root or a quotient, and begins no other lane when these belong to two lanes.
+    (Measured in a box that turns: levels, their root, bounds and the proof in one loop take 1.2 of the time.)
     """
     course = lanes.course
     if aim.lacks_passages(walls):
@@ -207,21 +207,21 @@ def _aim_at_moving(walls, gravity, lanes, live):
 
 
 def _of_flights(ask, walls, gravity, lanes, live, *given):
-    """Ask something of the flight of every lane."""
+    """Call a function with the flight of every lane."""
     for i in range(index(live)):
         lane = lanes.lane(i)
         ask(walls, gravity, lanes.course, i, lane.r, lane.v, lane.remaining, *given)
 
 
 def _put_waves(walls, course, live, is_guess):
-    """The waves of the angles of all lanes."""
+    """Compute the waves of the angles of all lanes."""
     for i in range(index(live)):
         aim.put_waves(walls, course, i, is_guess)
 
 
 @outlined
 def _mark_open(lanes, live):
-    """The number of lanes without a proven hit; the lanes are in `lanes.order`."""
+    """Return the number of lanes without a proven hit, which are in `lanes.order`."""
     for i in range(index(live)):
         lanes.marked[i] = aim.is_open(lanes.course, i, lanes.lane(i).remaining)
     return marked_lanes(lanes, live)
@@ -229,9 +229,9 @@ def _mark_open(lanes, live):
 
 @outlined
 def _stride_open(walls, gravity, lanes, some):
-    """The proof by series, or else the first safe step, of so many lanes, those in `lanes.order`.
+    """Prove hits by series, or make the first safe step, of the first `some` lanes of `lanes.order`.
 
-    Side by side in tables of their own: one lane alone takes as long as a vector of them, which the last one fills.
+    Side by side in tables of their own: one lane alone takes as long as a vector of them, which the last lane fills.
     """
     course, starts = lanes.course, unwritten((Open.COUNT, STRIDE), np.float64)
     beside, count = unwritten((aim.rows(walls), STRIDE), np.float64), whole_eights(some)
@@ -252,7 +252,7 @@ def _stride_open(walls, gravity, lanes, some):
     for k in range(count):
         one = Open(starts, k)
         strides.stride(walls, gravity, beside, k, one.r, one.v, one.remaining, True)
-    # A contact takes them from its course, where a proof has left those of its hit.
+    # A contact takes angles and waves from its course, where a proof has left the ones of its hit.
     for k in range(count):
         aim.put_angles(walls, beside, k, Open(starts, k).remaining - beside[strides.TIME, k])
     _put_waves(walls, beside, count, False)
@@ -263,7 +263,7 @@ def _stride_open(walls, gravity, lanes, some):
 
 
 def _go_by_steps(walls, gravity, lanes, live):
-    """The course of every lane to its first hit, by safe steps."""
+    """Find the first hit of every lane by safe steps."""
     course = lanes.course
     for i in range(index(live)):
         lane = lanes.lane(i)
@@ -275,12 +275,12 @@ def _go_by_steps(walls, gravity, lanes, live):
             _go_on_beside(walls, gravity, lanes, some, tries, SAFE_STEPS + MORE_STEPS)
             return
         _try_on(walls, gravity, lanes, some, tries)
-    # The few that need more take it in the same pass: a flight in two parts would look like a short one.
+    # The few lanes that need more steps take them in the same pass: a flight in two parts would look like a short one.
     if walls.are_looked_at():
         some, left = _look_on(walls, gravity, lanes, live)
         _go_on_beside(walls, gravity, lanes, some, 0, left)
         return
-    # Of lanes that do not step together those are marked that have no hit by a guess.
+    # Lanes that do not step together are marked if no guess has found their hit.
     together = _together(gravity, walls)
     for _step in range(together):
         for i in range(index(live)):
@@ -292,13 +292,13 @@ def _go_by_steps(walls, gravity, lanes, live):
 
 
 def _look_on(walls, gravity, lanes, live):
-    """Looks of all lanes while many need them: (how many lanes need more, the looks that are left to them)."""
+    """Make looks of all lanes while many need them; return (the number of lanes that need more, the looks left)."""
     left, some = SAFE_STEPS + MORE_STEPS, live
     if not all(wall.looked_at for wall in walls.each):
-        # Many flights meet another wall before they come near to one that is looked at.
+        # Many flights meet another wall before they come near to one that needs looks.
         some = _mark(walls, gravity, lanes, live)
     while left > 0 and _LOOK * some >= live:
-        # Where all lanes need looks, one more will not do.
+        # If all lanes need looks, a single one does not suffice.
         looks = min(SAFE_STEPS if some == live else 1, left)
         for _look in range(looks):
             for i in range(index(live)):
@@ -308,16 +308,16 @@ def _look_on(walls, gravity, lanes, live):
 
 
 def _together(gravity, walls):
-    """How many safe steps all lanes take, before those that need more take them one by one."""
+    """Return the number of safe steps of all lanes together, before the lanes that need more take them one by one."""
     if gravity is None and walls.are_polynomial():
         return 0 if walls.aim(gravity) else POLYNOMIAL_STEPS
     return SAFE_STEPS
 
 
 def _aim(walls, gravity, lanes, live):
-    """The guesses of all lanes, and those that lead to a hit: (the tries that are left, how many lanes need them).
+    """Guess the hits of all lanes; return (the tries left, the number of lanes that need them).
 
-    In a loop each: the chain of operations of one lane is longer than what a processor looks ahead.
+    Each part has its own loop: the chain of operations of one lane is longer than the window of a processor.
     """
     course, tries, some = lanes.course, AIMED - 1, live
     for i in range(index(live)):
@@ -330,7 +330,7 @@ def _aim(walls, gravity, lanes, live):
         for i in range(index(live)):
             flights.aimed(walls, gravity, course, 0, i, False)
         tries, some = tries - 1, _mark(walls, gravity, lanes, live)
-        # Most guesses lead to a hit, in this frame or after it: of those lanes nothing else is asked.
+        # Most guesses lead to a hit, in this frame or after it: their lanes are done.
         if _MANY * some >= live:
             for i in range(index(live)):
                 flights.leave_free(walls, gravity, course, 0, i, lanes.lane(i).remaining)
@@ -339,7 +339,7 @@ def _aim(walls, gravity, lanes, live):
 
 
 def _try_on(walls, gravity, lanes, some, tries):
-    """The last tries of so many lanes, those in `lanes.order`: a lane tries as often, however many try with it."""
+    """Make the last tries of the first `some` lanes of `lanes.order`, each as often as if it were alone."""
     course = lanes.course
     for k in range(some):
         lane = index(lanes.order[k])
@@ -353,10 +353,10 @@ def _try_on(walls, gravity, lanes, some, tries):
 
 @outlined
 def _go_on_beside(walls, gravity, lanes, some, tries, most):
-    """The last tries and at most so many safe steps of so many lanes, those in `lanes.order`, side by side as others.
+    """Make the last tries and at most `most` safe steps of the first `some` lanes of `lanes.order`, side by side.
 
-    A safe step of one lane takes as long as one of eight: one by one they were half of the time of all falls. Straight
-    flights have their tries before.
+    A safe step of one lane takes as long as of eight: one by one they were half of the time of all falls. Straight
+    flights have had their tries before.
     """
     course, rows = lanes.course, len(walls.each) * flights.COURSE
     starts, beside = unwritten((Open.COUNT, STRIDE), np.float64), unwritten((rows, STRIDE), np.float64)
@@ -374,7 +374,7 @@ def _go_on_beside(walls, gravity, lanes, some, tries, most):
 
 
 def _try_on_beside(walls, gravity, starts, beside, count, tries):
-    """The last tries of so many lanes that fall, from their starts, and the first safe steps of the others."""
+    """Make the last tries of lanes that fall, from their starts, and the first safe steps of the others."""
     for k in range(count):
         flights.leave_free(walls, gravity, beside, 0, k, Open(starts, k).remaining)
     for left in range(tries, -1, -1):
@@ -388,7 +388,7 @@ def _try_on_beside(walls, gravity, starts, beside, count, tries):
 
 
 def _step_beside(walls, gravity, starts, beside, count, most):
-    """So many safe steps of so many lanes, from their starts, or fewer if the last has no need of more."""
+    """Make at most `most` safe steps of `count` lanes, from their starts, until none needs more."""
     for _step in range(most):
         more = 0
         for k in range(count):
@@ -403,7 +403,7 @@ def _step_beside(walls, gravity, starts, beside, count, most):
 
 
 def _go_on(walls, gravity, lanes, i):
-    """More safe steps of a lane, if need be."""
+    """Make more safe steps of a lane while they may find a hit in this frame."""
     for _step in range(MORE_STEPS):
         if not _needs_more(walls, gravity, lanes, i):
             break
@@ -412,14 +412,14 @@ def _go_on(walls, gravity, lanes, i):
 
 @outlined
 def _mark(walls, gravity, lanes, live):
-    """The number of lanes that need more safe steps; the lanes are in `lanes.order`."""
+    """Return the number of lanes that need more safe steps, which are in `lanes.order`."""
     for i in range(index(live)):
         lanes.marked[i] = _needs_more(walls, gravity, lanes, i)
     return marked_lanes(lanes, live)
 
 
 def _step_on(walls, gravity, lanes, i):
-    """One safe step of a lane."""
+    """Make one safe step of a lane."""
     lane = lanes.lane(i)
     flights.step(walls.at(lane.remaining), gravity, lanes.course, 0, i, lane.r, lane.v)
 
@@ -432,7 +432,7 @@ def _needs_more(walls, gravity, lanes, i):
 
 
 def _flight(method, walls, gravity, lanes, i, hit):
-    """A lane to its next contact, `hit` if the method lands on walls, or to the end of the frame."""
+    """Fly a lane to its next contact, `hit` if the method lands on walls, or to the end of the frame."""
     lane = lanes.given(method, i)
     if method.lands:
         if walls.inset is not None:

@@ -1,9 +1,9 @@
-"""The first hits of all lanes with the facets of a mesh: each lane goes from cell to cell until it meets one.
+"""Find the first hits of all lanes with the facets of a mesh: each lane goes from cell to cell until it meets one.
 
-Lanes go through the cells of a mesh that moves in the same way, as curves in its frame: in_moving_cells.py.
+Lanes go through the cells of a moving mesh in the same way, as curves in its frame: in_moving_cells.py.
 
-All lanes take a step together, in loops of which those without branches vectorise; then those that have come into a
-cell with facets look at these. One lane after the other would wait for each number that it looks up: 4 times as long.
+All lanes take a step together, in loops of which those without branches vectorise; then the lanes that have come into
+a cell with facets look at these. Lane by lane, each would wait for every number from memory: 4 times as long.
 """
 
 import numpy as np
@@ -21,65 +21,65 @@ from .table import STRIDE, marked_lanes, whole_eights
 
 # The hit of a lane, in rows of `course`.
 _TIME, _WALL = 0, 1
-# So many blocks of entries are looked at together; so many a lane has usually.
+# The number of blocks of entries that are tested together, and the usual number for a lane.
 _BLOCKS, _USUAL = 256, 2
-# Steps of a lane after which its flight is said to be free so far.
+# Steps of a lane after which the rest of its flight is left to the next pass.
 _MOST = 4000
-# The rows of a lane that is under way. Those of its flight at its start are first, so many they are at most; then where
-# it is, the room of its cell, and a cone of the normals there. Rows of a mesh that moves are after them.
+# The rows of a lane that is under way: first its flight at its start, in at most _OWN rows; then its place, the room of
+# its cell, and a cone of the normals there. Rows of a moving mesh follow them.
 START, SPEED, _OWN = 0, 3, 8
 PLACE, _BACK, _AHEAD, _AXIS, _SINE, ROWS = _OWN, _OWN + 3, _OWN + 6, _OWN + 9, _OWN + 12, _OWN + 13
-# Where it is from the middle of its cell, when what is behind it is not asked for any more
+# The place relative to the middle of the cell replaces the room behind the lane, which is not needed any more.
 MIDDLE = _BACK
 
 
 class UnderWay(Record):
     """The lanes that are under way, closed up: they fly straight or fall, past facets at rest."""
 
-    rows: Array  # what is known of each lane
-    time: Array  # how far it has come
-    until: Array  # how far it comes in this step, up to its hit
+    rows: Array  # the rows of each lane
+    time: Array  # the time of its flight so far
+    until: Array  # the end of this step, at most its hit
     wall: Array  # the facet of that hit, or -1
     cell: Array  # int64
     inside: Array  # bool, whether it is in the grid
     owner: Array  # int64, the lane
     last: Array  # the time after which no hit counts
 
-    # How many rows there are, and how many of them are of the flight at its start.
+    # The number of rows, and of the rows of the flight at its start.
     width, own = ROWS, 6
 
     def begin(self, i, lane, found):
-        """A lane with its hit so far at its start."""
+        """Put lane i at its start, with its hit so far."""
         put(self.rows, START, i, lane.r)
         put(self.rows, SPEED, i, lane.v)
         self.time[i], self.owner[i] = 0.0, i
         self.last[i] = select(lane.remaining < found, lane.remaining, found)
 
-    # --- What differs where the mesh moves ---
+    # --- The difference for a moving mesh ---
 
     def facets(self, mesh):
         """The facets of the mesh."""
         return mesh
 
     def look_up(self, mesh, n):
-        """Look up what `see` asks for, of so many lanes."""
+        """Look up the numbers that `see` needs, for n lanes."""
 
     def see(self, gravity, mesh, i):
-        """Look where a lane is now in the frame of the mesh; its place."""
+        """Look where a lane is now in the frame of the mesh; return its place."""
         return self.now(gravity, i)[0]
 
     def now(self, gravity, i):
-        """The position and the velocity of a lane now in the frame of the mesh, as it was seen."""
+        """Return the position and the velocity of a lane in the frame of the mesh, from the last `see`."""
         r, v, t = column(self.rows, START, i), column(self.rows, SPEED, i), self.time[i]
         return r + displacement(gravity, v, t), accelerated(gravity, v, t)
 
     def until_out(self, gravity, mesh, i, first, last):
-        """How long a lane surely is among the cells from one place to another one."""
+        """Return a time for which a lane surely stays among the cells from one place to another."""
         place, pace = self.now(gravity, i)
         return until_out(gravity, mesh.grid, first, last, place, pace)
 
     def until_in(self, gravity, mesh, i):
-        """Until when a lane that is outside of the grid surely does not come into it."""
+        """Return a time until which a lane outside of the grid surely does not come into it."""
         return _until_in(gravity, mesh.grid, self, i)
 
     def may_meet(self, gravity, mesh, i, cone):
@@ -92,16 +92,16 @@ class UnderWay(Record):
         return not (cone.is_left(now) & cone.is_left(then))
 
     def keep_way(self, gravity, mesh, i):
-        """Keep what `way` asks for, if that is long to compute: a lane may look at many blocks of facets."""
+        """Keep the result of `way`, if it is long to compute: a lane may look at many blocks of facets."""
 
     def way(self, gravity, mesh, i):
-        """That way, as `FlightInCell`."""
+        """Return the way of a lane through its cell, as `FlightInCell`."""
         v, time = column(self.rows, SPEED, i), self.time[i]
         at, pace = column(self.rows, MIDDLE, i), accelerated(gravity, v, time)
         return flight_in(mesh.grid, at, pace, gravity, self.until[i] - time)
 
     def meet(self, gravity, mesh, maybe, some):
-        """Take the hits of lanes with so many facets that they may meet."""
+        """Take the hits of lanes with the `some` facets that they may meet."""
         for n in range(some):
             i = index(maybe.lane[n])
             r, v = column(self.rows, START, i), column(self.rows, SPEED, i)
@@ -110,21 +110,21 @@ class UnderWay(Record):
     # --- From step to step ---
 
     def move(self, source, target):
-        """One lane into the place of another one."""
+        """Move a lane to the place of another one."""
         for k in range(self.own):
             self.rows[k, target] = self.rows[k, source]
         self.time[target], self.owner[target] = self.time[source], self.owner[source]
         self.last[target] = self.last[source]
 
     def in_eights(self, n):
-        """So many in whole vectors: the last lane is there again, as one alone takes as long as eight."""
+        """Fill n lanes up to whole vectors with copies of the last one: one lane alone takes as long as eight."""
         count = whole_eights(n)
         for i in range(index(n), count):
             self.move(index(n - 1), i)
         return count
 
     def take(self, i, met):
-        """Take a `Hit` of a lane, or without a wall how far it surely meets none, if it is the first on its way."""
+        """Take a `Hit` of a lane if it is the first on its way; with wall -1, a time until which it meets no wall."""
         sooner = met.time < self.until[i]
         self.until[i] = select(sooner, met.time, self.until[i])
         self.wall[i] = select(sooner, met.wall, self.wall[i])
@@ -136,7 +136,7 @@ class UnderWay(Record):
             course[_TIME, owner], course[_WALL, owner] = time, wall
 
     def go_on(self, gravity, mesh, before, course, n):
-        """Every lane to the next cell, or to its hit: how many are under way still."""
+        """Move every lane to its next cell, or end it at its hit; return the number of lanes still under way."""
         left = 0
         for i in range(index(n)):
             until, wall = self.until[i], self.wall[i]
@@ -153,7 +153,7 @@ class UnderWay(Record):
 
 
 def under_way(kind):
-    """Room for lanes that are under way, of that kind."""
+    """Allocate the arrays of lanes that are under way, of class `kind`."""
     return kind(
         unwritten((kind.width, STRIDE), np.float64), unwritten(STRIDE, np.float64), unwritten(STRIDE, np.float64),
         unwritten(STRIDE, np.float64), unwritten(STRIDE, np.int64),
@@ -164,15 +164,15 @@ def under_way(kind):
 class Maybe(Record):
     """The facets that lanes may meet in their cells.
 
-    All are looked up before one is looked at: so they are on their way from memory together.
+    All are looked up before one is tested, so that they are fetched from memory together.
     """
 
-    place: Array  # int64, which entry of all blocks that are looked at
+    place: Array  # int64, the place among the entries of all blocks that are tested
     lane: Array  # int64
     facet: Array  # int64
 
     def look_up(self, facets, looks, some):
-        """Look up so many."""
+        """Look up `some` facets."""
         for n in range(some):
             j, k = index(self.place[n] // BLOCK), index(self.place[n] % BLOCK)
             self.lane[n], self.facet[n] = looks.lane[j], facets.grid.entries[index(looks.block[j] * BLOCK) + k]
@@ -182,37 +182,37 @@ class Maybe(Record):
 
 
 def maybe_met():
-    """Room for them."""
+    """Allocate the arrays of `Maybe`."""
     room = _BLOCKS * BLOCK
     return Maybe(unwritten(room, np.int64), unwritten(room, np.int64), unwritten(room, np.int64))
 
 
 class Looks(Record):
-    """Blocks of entries, each of which a lane looks at."""
+    """Blocks of entries, and the lane that looks at each."""
 
     lane: Array  # int64
     block: Array  # int64
 
     def take(self, planes, j, lane, block):
-        """A look, of which the block is on its way from memory then."""
+        """Add a look, and fetch its block from memory."""
         self.lane[j], self.block[j] = lane, block
         ask_for(planes, block, planes.shape[1] * planes.shape[2])
 
 
 def ask_for(table, row, size):
-    """Ask for both lines of the cache that a row of a table, of so many numbers, is in."""
+    """Fetch both cache lines of a row of a table with `size` numbers a row."""
     fetch(table, row * size)
     fetch(table, row * size + size // 2)
 
 
 @outlined
 def go_through(gravity, facets, before, lanes, live):
-    """The first hits of every live lane with facets that have so many walls before them, or that found before."""
+    """Find the first hit of every live lane with facets that have `before` walls before them; keep an earlier one."""
     go_from_cell_to_cell(under_way(UnderWay), gravity, facets, before, lanes, live)
 
 
 def go_from_cell_to_cell(under, gravity, mesh, before, lanes, live):
-    """As `go_through`, of lanes that are under way in this manner, and of a mesh that they know."""
+    """Find first hits as `go_through`, with the lanes `under` and any mesh that they support."""
     course, maybe = lanes.course, maybe_met()
     looks = Looks(unwritten(_BLOCKS, np.int64), unwritten(_BLOCKS, np.int64))
     for i in range(index(live)):
@@ -229,14 +229,14 @@ def go_from_cell_to_cell(under, gravity, mesh, before, lanes, live):
 
 
 def _find_cells(gravity, mesh, under, lanes, n):
-    """The cell that every lane is in, how far it comes from there, and whether it may meet a facet on this way."""
+    """Find the cell of every lane, how far the lane comes in this step, and whether it may meet a facet on this way."""
     cells, rows = under.facets(mesh).grid, under.rows
     under.look_up(mesh, n)
     for i in range(index(n)):
         cell = cell_of(cells, under.see(gravity, mesh, i))
         put(rows, PLACE, i, cell.place)
         under.cell[i], under.inside[i] = cell.number, cell.inside
-    # What is outside of the grid is in the cell after its last, which holds nothing.
+    # Lanes outside of the grid are in the cell after its last, which is empty.
     for i in range(index(n)):
         cell = index(under.cell[i])
         room, cone = room_of(cells.known.room, cell), cone_of(cells.known.room, cell)
@@ -257,7 +257,7 @@ def _find_cells(gravity, mesh, under, lanes, n):
 
 
 def _look(gravity, mesh, under, found, order, n):
-    """So many lanes at the facets in their cells, by their planes first."""
+    """Let n lanes look at the facets in their cells, by their planes first."""
     cells, (looks, _maybe), blocks = under.facets(mesh).grid, found, index(0)
     for j in range(n):
         i = order[j]
@@ -265,7 +265,7 @@ def _look(gravity, mesh, under, found, order, n):
         if blocks > _BLOCKS - _USUAL:
             _look_into(gravity, mesh, under, found, blocks)
             blocks = index(0)
-        # Those that are not its own the next lane writes over: how many there are no processor foresees.
+        # The next lane overwrites blocks that are not its own: without a branch, as no processor foresees their number.
         for k in range(_USUAL):
             looks.take(cells.known.planes, blocks + index(k), i, begin + k)
         blocks += index(select(end - begin < _USUAL, end - begin, _USUAL))
@@ -280,7 +280,7 @@ def _look(gravity, mesh, under, found, order, n):
 
 @outlined
 def _look_into(gravity, mesh, under, found, blocks):
-    """Lanes each at a block of entries in their cells, then at the facets of which they may pass the planes."""
+    """Let each lane look at a block of entries in its cell, then at the facets with planes that it may pass."""
     (looks, maybe), cells, some = found, under.facets(mesh).grid, 0
     marked = unwritten((_BLOCKS, BLOCK), np.bool_)
     for j in range(blocks):
@@ -295,7 +295,7 @@ def _look_into(gravity, mesh, under, found, blocks):
 
 
 def _look_at(gravity, mesh, under, found, some):
-    """So many lanes each at a facet."""
+    """Let `some` lanes look each at a facet."""
     looks, maybe = found
     maybe.look_up(under.facets(mesh), looks, some)
     under.meet(gravity, mesh, maybe, some)
@@ -303,6 +303,6 @@ def _look_at(gravity, mesh, under, found, some):
 
 @outlined
 def _until_in(gravity, cells, under, i):
-    """Until when a lane that is outside of the grid surely does not come into it."""
+    """Return a time until which a lane outside of the grid surely does not come into it."""
     place, pace = under.now(gravity, i)
     return under.time[i] + until_next(gravity, cells, cell_of(cells, place), place, pace)

@@ -1,7 +1,7 @@
 """The body of a field that each lane has met: its numbers in rows of lanes, so that contacts with bodies vectorise.
 
-A contact writes into the lanes. The compiler cannot prove that a table of numbers that it reads does not overlap the
-lanes, and vectorises nothing: 13 of the 29 ns of a pass. So these rows are on the stack.
+A contact writes to the lanes. The compiler cannot prove that a table of numbers that it reads does not overlap the
+lanes, and then it does not vectorise: 13 of the 29 ns of a pass. So these rows are on the stack.
 """
 
 from typing import Any
@@ -18,7 +18,7 @@ from .table import STRIDE
 
 
 class Picked(Record):
-    """A field of which one body matters."""
+    """A field reduced to the body that was met."""
 
     body: Any
     number: float
@@ -28,24 +28,24 @@ class Picked(Record):
         return self.number
 
     def wall(self, number):
-        """The one that matters."""
+        """The body that was met."""
         return self.body
 
 
 def _fields(walls):
-    """The fields of a scene, with their numbers. Of walls that move each contact looks at all."""
+    """The fields of a scene with their numbers; () if walls move, as each contact then looks at all bodies."""
     return () if isinstance(walls, Carried) else walls.fields()
 
 
 def picks(method, walls):
-    """Room for the numbers of a body in each lane, of every field, or () if a contact looks at all bodies."""
+    """Allocate the rows of a body in each lane for every field, or () if a contact looks at all bodies."""
     if method.looks_around:
         return ()
     return tuple(scratch((STRIDE, width(field.members.like)), np.float64) for _number, field in _fields(walls))
 
 
 def pick(walls, lanes, picked, live):
-    """The numbers of the body that each lane has met; of any where it has met none of this field."""
+    """Copy the numbers of the body that each lane has met; any body of a field that the lane has not met."""
     for (before, field), rows in zip(_fields(walls) if picked else (), picked, strict=True):
         members, last = field.members, field.count() - 1.0
         for i in range(index(live)):
@@ -55,7 +55,7 @@ def pick(walls, lanes, picked, live):
 
 
 def of_lane(walls, picked, i):
-    """The walls of a scene for the contact of one lane."""
+    """Return the walls of a scene for the contact of one lane."""
     if not picked:
         return walls
     fields = (

@@ -1,8 +1,8 @@
-"""The first hits of all lanes with the facets of a mesh that moves: from cell to cell in the frame of the mesh.
+"""Find the first hits of all lanes with the facets of a moving mesh, from cell to cell in the frame of the mesh.
 
-There a flight is a curve, with a bound of its jerk: each lane goes on for as long as it surely stays among the cells
-that it is in. The loops are those of a mesh at rest. Where a flight may come through the plane of a facet, safe steps
-to that facet alone lead to the hit: none is skipped.
+In this frame a flight is a curve with a bound of its jerk: each lane goes on while it surely stays among the cells
+that it is in. The loops are those of a mesh at rest. Where a flight may pass through the plane of a facet, safe steps
+to this facet alone lead to the hit: none is skipped.
 """
 
 import math
@@ -26,27 +26,27 @@ from ..surfaces.time_of_impact.safe import CURVED
 from .from_cell_to_cell import MIDDLE, ROWS, SPEED, START, UnderWay, go_from_cell_to_cell, under_way
 from .table import LANES, STRIDE, whole_eights
 
-# More rows of a lane that is under way: of its flight at its start, and of where it is in the frame of the mesh.
+# More rows of a lane that is under way: of its flight at its start, and of its state in the frame of the mesh.
 _REMAINING, _FAST = SPEED + 3, SPEED + 4
 _PLACE, _PACE, _PULL, _ARM, _COORDINATES = ROWS, ROWS + 3, ROWS + 6, ROWS + 9, ROWS + 10
-# And its way through its cell, which begins where it is from the middle of that.
+# Then its way through its cell, which begins at its place relative to the middle of the cell.
 _WAY, _BENT, _NUMBERS, _PIECE = ROWS + 11, ROWS + 14, tuple(range(ROWS + 17, ROWS + 22)), ROWS + 22
 # Safe steps to one facet.
 _STEPS = 100
-# The bounds of a flight hold for at most so many times the time in which the motion changes little: a turn by a radian
-# and a quarter.
+# The bounds of a flight hold for at most this multiple of the time in which the motion changes little: a turn by a
+# radian and a quarter.
 _LONGEST = 25.0
-# A flight that comes to the plane of a facet just beyond an edge goes on by this part of the facet's room.
+# A flight that comes to the plane of a facet just beyond an edge moves on by this fraction of the room of the facet.
 _ON = 0.5
-# Lanes take so many safe steps to facets side by side, as most need no more.
+# The number of safe steps to facets that lanes take side by side; most need no more.
 _TOGETHER = 5
-# Where a step to a facet leads: to the hit, nearer to it, to its plane beyond an edge, or to where it is not behind it;
-# past it in the time that counts, or where a lane takes its steps by itself.
+# Where a step to a facet leads: to the hit, nearer to it, to its plane beyond an edge, or to a place in front of it;
+# past it in the time that counts, or to a lane that takes its steps by itself.
 _TO_HIT, _NEARER, _BEYOND, _BEHIND, _PAST, _ALONE = 0.0, -1.0, -2.0, -3.0, -4.0, -5.0
 
 
 class UnderWayInMotion(UnderWay):
-    """Those that go through the cells of a mesh that moves: curves in its frame."""
+    """Lanes that go through the cells of a moving mesh: curves in its frame."""
 
     width, own = ROWS + 23, 8
 
@@ -55,12 +55,12 @@ class UnderWayInMotion(UnderWay):
         self.rows[_REMAINING, i], self.rows[_FAST, i] = lane.remaining, norm(lane.v)
 
     def flight(self, gravity, i):
-        """The flight of a lane."""
+        """Return the flight of a lane."""
         r, v, rows = column(self.rows, START, i), column(self.rows, SPEED, i), self.rows
         return flight_of(r, v, gravity, rows[_REMAINING, i], rows[_FAST, i])
 
     def seen(self, mesh, gravity, i):
-        """A lane in the frame of the mesh now, as `InWallFrame`."""
+        """Return a lane in the frame of the mesh now, as `InWallFrame`."""
         rows, flight = self.rows, self.flight(gravity, i)
         return InWallFrame(
             mesh.drive, column(rows, _PLACE, i), column(rows, _PACE, i), column(rows, _PULL, i),
@@ -134,7 +134,7 @@ class UnderWayInMotion(UnderWay):
 
 @outlined
 def go_through_moving(gravity, mesh, before, lanes, live):
-    """The first hits of every live lane with facets that have so many walls before them, or that found before."""
+    """Find the first hit of every live lane with facets that have `before` walls before them; keep an earlier one."""
     go_from_cell_to_cell(under_way(UnderWayInMotion), gravity, mesh, before, lanes, live)
 
 
@@ -143,7 +143,7 @@ def go_through_moving(gravity, mesh, before, lanes, live):
 
 @outlined
 def _meet(gravity, mesh, under, maybe, first, count):
-    """Take the hits with so many facets: those that a flight does not surely miss, by safe steps side by side."""
+    """Take the hits with `count` facets, except those that a flight surely misses, by safe steps side by side."""
     marked, near = unwritten(STRIDE, np.bool_), near_facets()
     last = first + index(count - 1)
     for n in range(index(count), whole_eights(count)):
@@ -168,37 +168,37 @@ def _meet(gravity, mesh, under, maybe, first, count):
 
 
 class NearFacets(Record):
-    """Lanes, each on its way to a facet by safe steps."""
+    """Lanes that are each on its way to a facet by safe steps."""
 
     lane: Array  # int64
     facet: Array  # int64
-    time: Array  # how far it has come
+    time: Array  # the time of its flight so far
     step: Array  # the next safe step
-    leads: Array  # where that leads, one of _TO_HIT, _NEARER, _PAST and _ALONE
-    piece: Array  # int64, on which piece of a path the mesh is
+    leads: Array  # where it leads, one of _TO_HIT, _NEARER, _PAST and _ALONE
+    piece: Array  # int64, the piece of a path that the mesh is on
 
     def look_up(self, mesh, under, count):
-        """Look up what `approach` asks for, of so many."""
+        """Look up the numbers that `approach` needs, for `count` lanes."""
         track = mesh.drive.track
         if track is not None:
             for k in range(count):
                 self.piece[k] = track.piece_at(self.time[k] - under.rows[_REMAINING, index(self.lane[k])])
 
     def approach(self, gravity, mesh, under, k):
-        """The next step, without a branch."""
+        """Compute the next step, without a branch."""
         i, facet, t = index(self.lane[k]), member(mesh.body, index(self.facet[k])), self.time[k]
         seen = mesh.on_piece(self.piece[k]).seen(under.flight(gravity, i), t)
         self.step[k], self.leads[k] = _approach(facet, seen, t, under.until[i])
 
     def in_eights(self, left):
-        """So many in whole vectors: the last one is there again, as one alone takes as long as eight."""
+        """Fill lanes up to whole vectors with copies of the last one: one lane alone takes as long as eight."""
         count = whole_eights(left)
         for k in range(left, count):
             self.lane[k], self.facet[k], self.time[k] = self.lane[left - 1], self.facet[left - 1], self.time[left - 1]
         return count
 
     def close_up(self, gravity, mesh, under, left):
-        """Take the hits of those that are there; how many are on their way still."""
+        """Take the hits of lanes that have arrived; return the number of lanes still on their way."""
         kept = index(0)
         for k in range(left):
             leads = self.leads[k]
@@ -212,9 +212,9 @@ class NearFacets(Record):
         return kept
 
     def arrive(self, gravity, mesh, under, k):
-        """Take a hit, unless the facet gives way there to one that is turned the other way."""
+        """Take a hit, unless the facet gives way there to one with the opposite orientation."""
         i, t, step = index(self.lane[k]), self.time[k], self.step[k]
-        # As at rest: flights from one of two such facets to the other one take no time.
+        # As at rest: flights between two such facets take no time.
         short = (t + step) * under.seen(mesh, gravity, i).bounds(0.0).speed <= mesh.body.like.room.value
         if short:
             self.go_alone(gravity, mesh, under, k)
@@ -222,13 +222,13 @@ class NearFacets(Record):
             under.take(i, Hit(t + step, float(self.facet[k])))
 
     def go_alone(self, gravity, mesh, under, k):
-        """Take the hit of a lane that goes on by itself."""
+        """Take the hit of a lane that makes the rest of its steps by itself."""
         i = index(self.lane[k])
         under.take(i, _met(gravity, mesh, (under.flight(gravity, i), self.time[k], under.until[i]), self.facet[k]))
 
 
 def near_facets():
-    """Room for those of as many lanes as are looked at together."""
+    """Allocate `NearFacets` for the lanes of one look."""
     return NearFacets(
         unwritten(STRIDE, np.int64), unwritten(STRIDE, np.int64), unwritten(STRIDE, np.float64),
         unwritten(STRIDE, np.float64), unwritten(STRIDE, np.float64), unwritten(STRIDE, np.int64),
@@ -237,14 +237,14 @@ def near_facets():
 
 @outlined
 def _met(gravity, mesh, way, m):
-    """The first `Hit` of a flight that has come so far with a facet, until a time, by one step after the other."""
+    """Return the first `Hit` of a flight with facet m; `way` is (flight, its time so far, the time at which to end)."""
     facet, (flight, t, until) = member(mesh.body, index(m)), way
     room, seen = facet.room.value, mesh.seen(flight, t)
     for _k in range(_STEPS):
         step = _step_to(facet, seen, until - t)
         if not step.time < until - t:
             return Hit(math.inf, -1.0)
-        # A step that is round-off of the time, too, leads to the hit.
+        # A step within the round-off of the time also leads to the hit.
         leads, beyond = step.wall == 0.0 or (step.wall == _NEARER and not t + step.time > t), step.wall == _BEYOND
         if leads:
             beyond = mesh.body.gives_way(index(m), _place(seen, step.time))
@@ -256,7 +256,7 @@ def _met(gravity, mesh, way, m):
 
 
 def _approach(facet, seen, t, until):
-    """The step of `_step_to` at a time without a branch, and where it leads: some lanes go on alone from there."""
+    """Return the step of `_step_to` and where it leads, without a branch; some lanes go on alone from there."""
     depth, rate, bend = facet.phi(seen.r), 0.5 * dot(facet.normal, seen.v), 0.5 * dot(facet.normal, seen.a)
     longest, room = until - t, 2.0 * EPSILON * seen.coordinates
     ahead = 2.0 * rise_time(depth, rate, bend)
@@ -275,11 +275,11 @@ def _approach(facet, seen, t, until):
 
 
 def _step_to(facet, seen, longest) -> Any:
-    """A safe step to a facet: where it leads is its wall."""
+    """Return a safe step to a facet as a `Hit`, where the wall says where the step leads."""
     depth, rate, bend = facet.phi(seen.r), 0.5 * dot(facet.normal, seen.v), 0.5 * dot(facet.normal, seen.a)
     is_behind, room = depth > facet.room.value, 2.0 * EPSILON * seen.coordinates
     if is_behind:
-        # It comes back first.
+        # First it comes back to the plane.
         depth, rate, bend = -depth, -rate, -bend
     ahead = min(2.0 * rise_time(depth, rate, bend), longest)
     bounds = seen.bounds(ahead)
@@ -289,7 +289,7 @@ def _step_to(facet, seen, longest) -> Any:
         return Hit(_leaving(facet, seen, Level(min(depth, -room), rate, bend, 1.0, 0.0), ahead), _NEARER)
     if is_behind:
         return Hit(time, _BEHIND)
-    # How deep a flight may be at the end of the step
+    # The largest depth of a flight at the end of the step
     left = 2.0 * sixth * ahead * time * time
     if (left <= room) & (time < longest) and not facet.is_beyond(_place(seen, time), 0.0):
         return Hit(time, 0.0)
@@ -301,22 +301,22 @@ def _step_to(facet, seen, longest) -> Any:
 
 @outlined
 def _leaving(facet, seen, level, longest):
-    """A time up to the longest in which a flight that leaves a plane, slowly, surely does not come back to it.
+    """Return a time up to `longest` in which a flight that leaves a plane slowly surely does not come back to it.
 
-    A particle that slides lets go where nothing pulls it to the wall, and not yet away. The bound of a long time ends
-    such a step after round-off, which would be a hit, and so would the next, without end.
+    A particle that slides leaves where the pull to the wall is zero, and not yet away from it. The bound of a long time
+    would end such a step after round-off, with a hit, and then the next one, without end.
     """
     return ThirdDerivativeBound(facet, seen, level).longest(longest)
 
 
 def _place(seen, t):
-    """Where a flight is after a time, but for its jerk."""
+    """Return the place of a flight after a time, without its jerk."""
     return seen.r + t * (seen.v + (0.5 * t) * seen.a)
 
 
 @outlined
 def _until_in(gravity, mesh, under, i):
-    """Until when a lane that is outside of the grid surely does not come into it."""
+    """Return a time until which a lane outside of the grid surely does not come into it."""
     cells, seen, longest = mesh.body.grid, under.seen(mesh, gravity, i), under.last[i] - under.time[i]
     cell, time, within = cell_of(cells, seen.r), 0.0, longest
     for _k in range(8):

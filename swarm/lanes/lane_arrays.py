@@ -1,4 +1,4 @@
-"""The particles that are being advanced, one in each lane: arrays that fit in the cache, and the ways in and out."""
+"""The particles that are being advanced, one in each lane: arrays that fit in the cache, and how lanes are filled."""
 
 import math
 from typing import Any, NamedTuple
@@ -24,11 +24,11 @@ class Flying(Advanced):
     """A particle that flies, in its lane."""
 
     r, v, remaining, own, hits = _named.vector(), _named.vector(), _named.number(), _named.vector(), _named.number()
-    # The first of what its method keeps of it, where contacts change the energy: twice that, per mass.
+    # The first number that a method keeps of a particle: twice its energy per mass, where contacts change it.
     twice = Number(own.row)
 
-    # The rows of a particle. After them are the flight of a lane that `seek` closes up, and the lane at the last look
-    # at all lanes: with a separate array for that, impacts in an ellipsoid took twice as long.
+    # The rows of a particle. After them are the flight of a lane that `seek` closes up, and its state at the last look:
+    # with a separate array for that state, impacts in an ellipsoid took twice as long.
     ROWS = _named.count
     CLOSED_UP = _named.take(6)
     looked_particle, looked_left, looked_hits = _named.number(), _named.number(), _named.number()
@@ -36,19 +36,19 @@ class Flying(Advanced):
     ALL = _named.count
 
     def look(self, p):
-        """As `Advanced.look`, with all that its flight depends on."""
+        """Keep the state for the next look, with all that the flight depends on."""
         Advanced.look(self, p)
         self.looked_hits, self.looked_r, self.looked_v = self.hits, self.r, self.v
 
     def goes_round(self, p):
-        """Whether particle p, of this lane, is what it was when it was looked at: it will be so again without end."""
+        """Whether particle p of this lane is in its state of the last look: then it goes round without end."""
         off = square(self.r - self.looked_r) + square(self.v - self.looked_v)
         return self.looked_particle == p and self.looked_left == self.remaining and off == 0.0
 
     def hardly_turns(self, p, most):
-        """Whether particle p, of this lane, stood while it met walls, and does not turn round in so many impacts.
+        """Whether particle p of this lane stood still while it met walls, and `most` impacts would not turn it round.
 
-        Between walls at an angle it turns by that at an impact, and leaves after less than half a turn.
+        Between walls at an angle each impact turns it by this angle, and it leaves after less than half a turn.
         """
         stood = self.looked_particle == p and self.looked_left == self.remaining
         turn, hits = norm(self.v - self.looked_v), self.hits - self.looked_hits
@@ -63,51 +63,51 @@ class Lanes(NamedTuple):
     """Arrays with a column for each lane. NumPy makes them: in a kernel this takes a tenth of a second to compile."""
 
     rows: Array  # (Flying.ALL, stride)
-    impulse: Array  # (booked, stride) normal impulse per mass, then the work of walls that move
+    impulse: Array  # (booked, stride) normal impulse per mass, then the work of moving walls
     wall: Array  # the wall of the contact in this pass, -1 for none, HARD - wall where the lane is hard
-    kappa: Array  # the contact's unknown
-    unsolved: Array  # bool, whether its solve goes on
-    sweeping: Array  # bool, whether the loop of its multiplier goes on
-    record: Array  # (RECORDS, stride) the loop of its multiplier
-    course: Array  # (walls COURSE and more, stride) the safe steps of a flight, or what is known of its first hit
+    kappa: Array  # the unknown of the contact
+    unsolved: Array  # bool, whether the solve goes on
+    sweeping: Array  # bool, whether the loop of the multiplier goes on
+    record: Array  # (RECORDS, stride) the loop of the multiplier
+    course: Array  # (walls COURSE and more, stride) the safe steps of a flight, or its first hit so far
     turned: Array  # (4, stride) velocity and impulse after the contact, where `turn` finds them
     flown: Array  # the time of the flight before the contact, where the method asks for it
     particle: Array  # int64, the particle in the lane
-    marked: Array  # bool, from one loop to the next: of a fall that it needs more steps, then that it has arrived
+    marked: Array  # bool, from one loop to the next: a fall needs more steps, later the lane has arrived
     eights: Array  # int64, `marked` of eight lanes in one number: the same memory
-    some: Array  # int64, those `eights` of which one is marked
+    some: Array  # int64, the `eights` with a marked lane
     order: Array  # int64, the lanes that are marked
-    left_behind: Array  # (ROWS + booked, stride) what the lanes hold when a halt ends the block
-    period: Any = None  # the cell where it repeats
-    before: Any = None  # what a lane is before its contact, where impacts are logged or counted by wall
-    began: Any = None  # the same before its flight, where there are counters
-    stand: Any = None  # (walls, stride) 1 of a wall that stands in its step, 0 of one that is open to it
+    left_behind: Array  # (ROWS + booked, stride) contents of the lanes when a halt ends the block
+    period: Any = None  # the periodic cell
+    before: Any = None  # the state of a lane before its contact, where impacts are logged or counted by wall
+    began: Any = None  # the state before its flight, where there are counters
+    stand: Any = None  # (walls, stride) 1 of a wall that stands in the step of the lane, 0 of one that is open to it
 
     def lane(self, i):
         """The rows of a lane."""
         return Flying(self.rows, i)
 
     def given(self, method, i):
-        """The `Lane` that methods are given."""
+        """The `Lane` that methods take as an argument."""
         lane = self.lane(i)
         flown = self.flown[i] if method.asks_flown else None
         return methods.Lane(lane.r, lane.v, lane.remaining, lane.hits, method.own(*lane.own), flown)
 
     def faced(self, walls, i):
-        """The walls that the step of a lane meets: those that are open to it stand aside."""
+        """Return the walls that the step of a lane meets, without those that are open to it."""
         if self.stand is None:
             return walls
         return Faced(walls, tuple(self.stand[k, i] for k, _wall in enumerate(walls.each)))
 
     def load(self, method, walls, share, i, k):
-        """Load particle i into lane k, as it starts the frame, or as a halt left it."""
+        """Load particle i into lane k, at the start of the frame or where a halt stopped it."""
         self.particle[k] = i
         if share.counters is not None:
             share.counters.load(share.state, self, i, k)
         state, lane, remaining = share.state, self.lane(k), 0.0
         if state.contacts is not None:
             remaining = state.contacts.remaining[i]
-            # Where no contact lasts these arrays are never written, and so take no memory.
+            # Where no contact lasts, these arrays are never written, and so take no memory.
             if remaining > 0.0:
                 state.contacts.remaining[i] = 0.0
         if state.late is not None:
@@ -124,7 +124,7 @@ class Lanes(NamedTuple):
 
     @outlined
     def _pick_up(self, halted, i, k):
-        """Load particle i into lane k as a halt left it; whether one did."""
+        """Load particle i into lane k where a halt stopped it; return whether one did."""
         first, last = 0, halted.particle.size
         while first < last:
             middle = (first + last) // 2
@@ -158,7 +158,7 @@ class Lanes(NamedTuple):
         for s in range(booked(walls)):
             state.impulse[s, i] += self.impulse[s, k] * state.mass[i]
         if method.dissipates:
-            # The energy of each particle is kept, so what it has lost is accounted for with it.
+            # The energy of each particle is kept, so its loss is booked with it.
             now = 0.5 * lane.twice
             if method.laws.loses:
                 work = 0.0
@@ -174,7 +174,7 @@ class Lanes(NamedTuple):
         share.hand_over(i, phase)
 
     def move(self, walls, counters, source, target):
-        """The last live lane into the free slot. What flight and contact leave for each other need not move."""
+        """Move the last live lane to the free slot, without what flight and contact leave for each other."""
         copy_lane(self.rows, source, self.rows, target, Flying.ROWS)
         copy_lane(self.impulse, source, self.impulse, target, booked(walls))
         self.particle[target] = self.particle[source]
@@ -183,25 +183,25 @@ class Lanes(NamedTuple):
 
 
 class Halted(Record):
-    """Particles that a halt caught on their way: what their lanes held between two passes, one a column.
+    """Particles that a halt stopped on their way: the contents of their lanes between two passes, one a column.
 
-    Their way cannot be cut in two: a flight that ends at the halt and one that goes on from there are rounded twice.
+    Their flights cannot be cut in two: one that ends at the halt and one that goes on from there are rounded twice.
     """
 
     particle: Array  # int64, in order
     rows: Array  # (ROWS + booked, particles) the lane's rows, then its impulses
 
     def time_left(self):
-        """The time left of the frame of each."""
+        """The time left of the frame, of each particle."""
         return self.rows[Flying.remaining.row]
 
     def places(self):
-        """Where they are, (3, particles) [m]."""
+        """The positions, (3, particles) [m]."""
         return self.rows[Flying.r.row : Flying.r.row + 3]
 
 
 def empty(walls: int, given: int, period: Any = None, rows: int = Flying.ALL) -> Lanes:
-    """Lanes for one block, with so many rows of what walls give, and `rows` of a particle."""
+    """Allocate lanes for one block, with `given` rows for the walls, and `rows` rows of a particle."""
     eights = np.zeros(STRIDE // EIGHT, np.int64)
     return Lanes(
         rows=table(rows),
@@ -225,19 +225,19 @@ def empty(walls: int, given: int, period: Any = None, rows: int = Flying.ALL) ->
 
 
 def none_halted(rows: int) -> Halted:
-    """No particle was halted; with so many rows of what walls give."""
+    """Return no halted particles, with `rows` rows for the walls."""
     return Halted(np.empty(0, np.int64), np.empty((Flying.ROWS + rows, 0)))
 
 
-# --- Of one particle -------------------------------------------------------------------------------------
+# --- For one particle -----------------------------------------------------------------------------------
 
 
 def booked(walls):
-    """The number of rows for what the walls give: their impulses, then the work of those that move."""
+    """The number of rows for the walls: their impulses, then the works of moving walls."""
     return 2 * walls.length() if isinstance(walls, Carried) else walls.length()
 
 
 def speed2_scale(state, i):
-    """Twice the energy scale of a particle per mass, the square of a speed."""
+    """Return twice the energy scale of a particle per mass, the square of a speed."""
     scale = state.inverse_scale[i]
     return select(scale > 0.0, 2.0 / select(scale > 0.0, scale, 1.0), 1.0)

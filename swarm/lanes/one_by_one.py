@@ -1,4 +1,4 @@
-"""The particles in a phase, one after the other."""
+"""Advance the particles in a phase, one after the other."""
 
 import math
 
@@ -9,7 +9,7 @@ from .watching import log as impact_log
 
 
 def one_by_one(phase, advance, scene, share):
-    """Advance the particles in a phase that a thread draws, as long as they move on."""
+    """Advance the particles in a phase that a thread draws; return (status, particle, drawn)."""
     place, _live, done = impact_log.gone_on(share.log)
     while True:
         place = share.following(phase, place)

@@ -1,4 +1,4 @@
-"""Return particles to the periodic cell that they left; a check there shows whether their walls still hold them."""
+"""Return particles to the periodic cell that they left, and find whether their walls still hold them there."""
 
 import numpy as np
 
@@ -12,15 +12,15 @@ from ..surfaces.periodic.period import has_left, into, keeps_walls
 from .sliding import AGAIN
 from .table import marked_lanes
 
-# A wall does not hold a particle that comes back into the cell if its distance changes by more than this fraction of
-# the cell.
+# A wall does not hold a particle that returns to the cell if its distance changes by more than this fraction of the
+# cell.
 _ON_THE_WALL = 1e-12
 
 
 def return_lanes(method, walls, gravity, state, lanes, live):
-    """The lanes that their flight has brought out of the cell; what they meet there they meet in the next pass.
+    """Return lanes that have left the cell in their flight; they meet walls there in the next pass.
 
-    What goes by steps into walls takes its step in this pass, from the walls that it touches in the cell.
+    With a method that steps into walls they take their step in this pass, from the walls that they touch in the cell.
     """
     period = lanes.period
     if period is None:
@@ -41,9 +41,9 @@ def return_lanes(method, walls, gravity, state, lanes, live):
 
 
 def _come_through(period, state, p, images, twice):
-    """Count the images that a particle has come through, and change its energy to that in the cell.
+    """Count the images that a particle has passed through, and change its energy to that in the cell.
 
-    `twice` is twice the energy per mass of a lane; some changes of it are not in the state yet. Return its value
+    `twice` is twice the energy per mass of a lane; some changes of it are not yet in the state. Return its value
     after this change.
     """
     state.image[0, p] += np.int64(images.x)
@@ -51,7 +51,7 @@ def _come_through(period, state, p, images, twice):
     state.image[2, p] += np.int64(images.z)
     if period.fall is None:
         return twice
-    # Kahan's sum: the same change again and again would be rounded the same way each time.
+    # Kahan's sum: otherwise repeated equal changes would be rounded in the same direction each time.
     change = -dot(images, period.fall) - state.carry[p]
     before = state.energy[p]
     after = before + change
@@ -64,7 +64,7 @@ def _come_through(period, state, p, images, twice):
 
 
 def cut_steps(period, method, walls, gravity, lane, end):
-    """The `FlightEnd` of free steps, or of those of them that stay in the cell: the step out of it may meet images."""
+    """Return the `FlightEnd` of the free steps that stay in the cell: the step out of it may meet images."""
     if period is None:
         return end
     (r, v), (gx, gy, gz) = (lane.r, lane.v), pulls(gravity)
@@ -80,7 +80,7 @@ def cut_steps(period, method, walls, gravity, lane, end):
 
 
 def return_stepped_lanes(method, walls, share, lanes, live):
-    """The lanes that their steps have brought out of the cell."""
+    """Return lanes that have left the cell in their steps."""
     if lanes.period is None or not method.contacts_take_time:
         return
     for i in range(index(live)):
@@ -90,7 +90,7 @@ def return_stepped_lanes(method, walls, share, lanes, live):
 
 
 def return_stepped(method, walls, share, lanes, i):
-    """A lane that its step has brought out of the cell, at the end of this step: its contacts go on with images."""
+    """Return a lane that has left the cell in its step, at the end of this step: its contacts go on with images."""
     if has_left(lanes.period, lanes.lane(i).r):
         _return_stepped(method, walls, share, lanes, i)
 
@@ -108,7 +108,7 @@ def _return_stepped(method, walls, share, lanes, i):
 
 
 def _hand_on(period, walls, state, p, r, back):
-    """The impulse of each contact that goes on with another image of its wall to that."""
+    """Move the impulse of each contact that goes on with another image of its wall to this image."""
     for k in range(walls.length()):
         if state.pressed[k, p] + state.rubbed[k, p] == 0.0:
             continue
@@ -125,7 +125,7 @@ def _hand_on(period, walls, state, p, r, back):
 
 @outlined
 def return_sliding(period, walls, state, lanes, i, phase):
-    """A lane that slides, back into the cell where it goes on; its phase then: it flies to the image of its wall."""
+    """Return a sliding lane to the cell; return its phase, FLYING if its walls are others there."""
     lane, p = lanes.lane(i), lanes.particle[i]
     r = lane.r
     if phase == ARRIVED or not has_left(period, r):
@@ -140,7 +140,7 @@ def return_sliding(period, walls, state, lanes, i, phase):
 
 @outlined
 def return_particle(period, walls, state, p):
-    """A particle that its kernel has given back, into the cell."""
+    """Return a particle to the cell after its kernel has written it back."""
     contacts, r = state.contacts, column(state.position, 0, p)
     if not has_left(period, r):
         return
@@ -156,14 +156,14 @@ def return_particle(period, walls, state, p):
 
 @outlined
 def _are_there(period, walls, first, second, r, back):
-    """Whether the walls that hold a particle at r are those that hold it in the cell, not images of others."""
+    """Whether the walls that hold a particle at r also hold it in the cell, and not images of other walls."""
     there = _is_image(period, walls, (first, r), (first, back))
     return there and (second < 0.0 or _is_image(period, walls, (second, r), (second, back)))
 
 
 @outlined
 def _is_image(period, walls, before, after):
-    """Whether a wall (number, place) is to one place as another one, or itself, is to another place."""
+    """Whether the wall `after` (number, place) is at its place as the wall `before` is at its own."""
     (wall, r), (other, back) = before, after
     near = _ON_THE_WALL * (length_of(period.x) + length_of(period.y) + length_of(period.z))
     same = dot(walls.unit_normal(wall, r), walls.unit_normal(other, back)) > 0.5

@@ -1,8 +1,8 @@
-"""The impacts on walls that send particles off by a law: a temperature's, or a user-defined one.
+"""Impacts on walls that send particles off by a law: a temperature's, or a user-defined one.
 
-A loop without branches, which LLVM vectorises if the law has none, computes what becomes of each lane; another books
-it for those that are sent off. What the first reads of a particle, by its number, is put beside its lane before: the
-compiler cannot prove that a table in which the loop looks up numbers does not overlap what it writes.
+A loop without branches, which LLVM vectorises if the law has none, computes the velocity of each lane; another loop
+books the lanes that are sent off. The numbers of a particle that the first loop reads are copied to its lane before:
+the compiler cannot prove that a table in which the loop looks up numbers does not overlap the arrays that it writes.
 """
 
 import math
@@ -31,12 +31,12 @@ class Sending(LaneView):
     lost, heat, wait = _named.number(), _named.number(), _named.number()
     wall, mass = _named.number(), _named.number()
 
-    # With those of its flight.
+    # With the rows of its flight.
     ROWS = _named.count
 
 
 def send_off(method, walls, gravity, share, lanes, picked, live):
-    """Send off every lane that a law does; whether one of these gave no velocity, or one into the wall."""
+    """Send off every lane that meets a law; return whether a law gave no velocity, or one into the wall."""
     state, order = share.state, lanes.order
     for i in range(index(live)):
         p = index(lanes.particle[i])
@@ -50,13 +50,13 @@ def send_off(method, walls, gravity, share, lanes, picked, live):
 
 
 def _compute(method, walls, gravity, share, lanes, picked, i):
-    """What becomes of a lane, if a law sends it off."""
+    """Compute the velocity and the accounts of a lane, as if a law sends it off."""
     lane, sent, wall, laws = lanes.lane(i), Sending(lanes.rows, i), lanes.wall[i], method.laws
     here = method.walls_of(of_lane(walls, picked, i), lane.remaining)
     number = lanes.order[i] + np.int64(lane.hits)
     random = RandomSource(share.seed, share.first).of_impact(lanes.particle[i], number, laws)
     happens, found = by_law(laws, here, gravity, wall, Arriving(lane.r, lane.v, lane.twice, sent.mass), random)
-    # The contact is done, unless a wall at 0 K holds the particle, or one of its own law may.
+    # This ends the contact, unless a wall at 0 K holds the particle, or a user-defined law may.
     holds = not square(found.v) > 0.0
     if laws.own is not None:
         holds = holds | method.is_within(lanes.given(method, i), square(found.v), found.twice_away, 1.0)
@@ -74,7 +74,7 @@ def _book(method, walls, share, lanes, i):
         _leave_wrong(state, lanes, i)
         return True
     row = walls.row(wall)
-    # What impacts have taken since the energy was written is booked when the particle leaves its lane.
+    # The losses by impacts since the energy was written are booked when the particle leaves its lane.
     state.energy[p] = 0.5 * (sent.twice - sent.work) + (state.energy[p] - 0.5 * lane.twice)
     bounce = Bounce(sent.v, sent.impulse, sent.twice, 0.0, sent.work, sent.lost, sent.heat)
     heat = book_energy(state, (row, p, p), sent.mass, bounce)
@@ -95,7 +95,7 @@ def _book(method, walls, share, lanes, i):
 
 
 def _leave_wrong(state, lanes, i):
-    """Leave the arguments of a law that failed in the state."""
+    """Write the arguments of a law that failed to the state."""
     lane, p = lanes.lane(i), index(lanes.particle[i])
     put(state.position, 0, p, lane.r)
     put(state.velocity, 0, p, lane.v)

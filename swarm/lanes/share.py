@@ -1,4 +1,4 @@
-"""The part of a frame that one thread advances: the particles that it draws, and where it writes."""
+"""The part of a frame that one thread advances: the particles that it draws, and the arrays that it writes."""
 
 from typing import Any, NamedTuple
 
@@ -18,7 +18,7 @@ class Draws(NamedTuple):
     another one does the last.)
     """
 
-    ticket: Array  # (1,) how many of `order` all threads have drawn
+    ticket: Array  # (1,) the number of entries of `order` that all threads have drawn
     order: Array  # int64, the numbers of the draws
     size: int
     mine: Array  # int64, the draws of this thread, in order
@@ -32,8 +32,8 @@ class ThreadPlace(Record):
     """The position of a thread among the particles that it draws."""
 
     i: int  # the next particle
-    stop: int  # after the last one of its draw
-    drawn: int  # draws so far
+    stop: int  # the end of its draw
+    drawn: int  # the number of draws so far
 
     def is_end(self):
         """Whether no particle is left."""
@@ -48,8 +48,8 @@ class Share(NamedTuple):
     """The part of a frame that one thread advances."""
 
     state: Any  # `state.State`
-    phase: Array  # (N,) int8, whether each flies, slides on one wall or on two, or has arrived
-    pending: Array  # (PHASES,) int64, how many particles are left to other kernels, by their phase
+    phase: Array  # (N,) int8, whether each particle flies, slides on one wall or on two, or has arrived
+    pending: Array  # (PHASES,) int64, the number of particles left to other kernels, by their phase
     halted: Any  # `lane_arrays.Halted`
     draws: Draws
     halt: Array  # (1,) int64, passes after which to return
@@ -75,14 +75,14 @@ class Share(NamedTuple):
         return self.watchers.counters
 
     def note_stay(self, i, time):
-        """Count a time [s] in which walls hold particle i, for the first of them, or else for the wall that it met."""
+        """Count a time [s] for which walls hold particle i, for the first of them, or for the wall that it met."""
         if self.counts is not None:
             contacts = self.state.contacts
             first = contacts.walls[0, i]
             self.counts.stay(select(first >= 0.0, first, contacts.met[i]), time)
 
     def note_hops(self, wall, time):
-        """Subtract a time [s] of hops from the time in which a wall holds a particle."""
+        """Subtract a time [s] of hops from the time for which a wall holds a particle."""
         if self.counts is not None:
             self.counts.stay(max(wall, 0.0), -time)
 
@@ -92,9 +92,9 @@ class Share(NamedTuple):
         self.pending[phase] += 1
 
     def following(self, phase, place):
-        """The `ThreadPlace` of the first particle in a phase, from a place on; draws if need be.
+        """Return the `ThreadPlace` of the first particle in a phase from a place on; draw if necessary.
 
-        Counts the particles in other phases, which other kernels advance.
+        Count the particles in other phases, which other kernels advance.
         """
         draws, phases, pending = self.draws, self.phase, self.pending
         i, stop, drawn = place
@@ -115,6 +115,6 @@ class Share(NamedTuple):
 
 
 def take(draws: Draws, some: int) -> Array:
-    """The next `some` draws, for the calling thread alone."""
+    """Return the next `some` draws, for the calling thread alone."""
     first = min(some * next_of(draws.ticket), draws.order.size)
     return draws.order[first : first + some]

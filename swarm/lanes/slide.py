@@ -1,8 +1,8 @@
-"""Particles that slide, a block of them at once, in lanes: one kernel for one wall, one for the edges of two.
+"""Advance particles that slide, a block of them at once, in lanes: one kernel for one wall, one for edges of two walls.
 
-One pass is one composed step of every lane, in loops without branches. What a step may end with (the wall lets go,
-another wall is met, the particle stops) is found one lane at a time: the step is cut there and taken again, so that it
-ends at the instant to round-off. A lane writes what it gives its walls step by step, so that a halt changes no bit.
+One pass is one composed step of every lane, in loops without branches. An event in a step (the wall lets go, another
+wall is met, the particle stops) is found one lane at a time: the step is cut there and taken again, so that it ends
+at the instant to round-off. A lane books the impulses on its walls step by step, so that a halt changes no bit.
 """
 
 import numpy as np
@@ -28,9 +28,9 @@ from .watching.crossings import ParticleMoment
 
 @long_kernel
 def slide_block(kind, method, walls, gravity, share, lanes):
-    """Advance the particles of this kind, `One` or `Two`, that a thread draws: (status, particle, drawn).
+    """Advance the particles of this kind, `One` or `Two`, that a thread draws; return (status, particle, drawn).
 
-    Each until it has arrived, flies, or is held by other walls; `share.pending` counts what is left to other kernels.
+    Each goes on until it arrives, flies, or is held by other walls; `share.pending` counts those left to other kernels.
     """
     lanes = with_distances(lanes)
     slide = Slide(kind, method, walls, gravity, share.state, lanes, share.counts)
@@ -52,7 +52,7 @@ def slide_block(kind, method, walls, gravity, share, lanes):
         end_steps(slide, live)
         for i in range(live):
             slide.account(i)
-        # From the last, so that every lane behind one that leaves is still under way, and may take its place.
+        # From the last: then every lane behind one that leaves is still under way and may take its place.
         for i in range(live - 1, -1, -1):
             phase = _next_phase(slide, share, i)
             if phase != slide.phase():
@@ -61,13 +61,13 @@ def slide_block(kind, method, walls, gravity, share, lanes):
                 if not loaded:
                     live -= 1
                     lanes.move(live, i)
-    # A halt may have kept it from loading more.
+    # A halt may have kept the loop from loading more.
     return (Status.INTERRUPTED.value if passes >= share.halt[0] else Status.DONE.value), 0, place.drawn
 
 
 @outlined
 def _over(method, share, lanes, live, going):
-    """The status with which the call ends before the next pass, or DONE: (status, the particle that got nowhere)."""
+    """Return (the status that ends the call before the next pass, or DONE, a particle that made no progress)."""
     place, passes = going
     if passes >= share.halt[0]:
         return Status.INTERRUPTED.value, 0
@@ -84,7 +84,7 @@ def _over(method, share, lanes, live, going):
 
 
 def _next_phase(slide, share, i):
-    """The phase of a lane after a step."""
+    """Return the phase of a lane after a step."""
     phase, lanes = slide.phase(), slide.lanes
     if lanes.event[i] != 0:
         phase = decide(slide, i)
@@ -98,12 +98,12 @@ def _next_phase(slide, share, i):
 
 
 def _in_cell(slide, i, phase):
-    """A lane in the cell where it repeats; its phase then."""
+    """Return a lane to the periodic cell; return its phase."""
     lanes = slide.lanes
     return phase if lanes.period is None else return_sliding(lanes.period, slide.walls, slide.state, lanes, i, phase)
 
 
-# --- What it crosses -------------------------------------------------------------------------------------
+# --- Crossings of counters ------------------------------------------------------------------------------
 
 
 def _begin_step(slide, i):
@@ -114,7 +114,7 @@ def _begin_step(slide, i):
 
 @outlined
 def _count_step(slide, share, i):
-    """Count what a lane has crossed since its step began: the `ParticleMoment` of that."""
+    """Count the crossings of a lane since its step began; return the `ParticleMoment` of that beginning."""
     lane, began = slide.lanes.lane(i), Began(slide.lanes.began, i)
     before = ParticleMoment(began.r, began.v, began.remaining)
     share.counters.count_step(share, slide.lanes.particle[i], before, ParticleMoment(lane.r, lane.v, lane.remaining))
@@ -124,7 +124,7 @@ def _count_step(slide, share, i):
 
 @outlined
 def _count_return(slide, share, i, before, end):
-    """Count what a lane crosses at a face of the cell: its step has ended beyond the face; its next step begins."""
+    """Count the crossings of a lane at a face of the cell, where its step has ended; begin its next step."""
     lane = slide.lanes.lane(i)
     if slide.lanes.period is not None:
         shift = lane.r - end
@@ -139,10 +139,10 @@ def _count_return(slide, share, i, before, end):
 
 @outlined
 def _refill(slide, share, i, place, passes):
-    """The next particle that slides into lane i: the `Place` to go on from, whether there is one, and the passes.
+    """Load the next particle that slides into lane i; return (the next place, whether one was loaded, the passes).
 
-    None after a halt: what is loaded may rest or fly at once, one particle after the other. To rest where walls move
-    takes as long as a pass, and counts as one.
+    After a halt none is loaded, since the particles loaded may rest or fly at once, one after the other. To rest on
+    moving walls takes as long as a pass, and counts as one.
     """
     while passes < share.halt[0]:
         place = share.following(slide.phase(), place)
@@ -158,7 +158,7 @@ def _refill(slide, share, i, place, passes):
 
 @outlined
 def _load(slide, share, i, p):
-    """Particle p into lane i; whether it slides: it may also rest until the end of the frame, or fly."""
+    """Load particle p into lane i; return whether it slides: it may also rest until the end of the frame, or fly."""
     lane, state, contacts = slide.lanes.lane(i), slide.state, slide.state.contacts
     begins = not contacts.remaining[p] > 0.0
     remaining = share.span if begins else contacts.remaining[p]
@@ -169,7 +169,7 @@ def _load(slide, share, i, p):
     lane.keep, lane.twice, lane.scale2 = contacts.keep[p], 2.0 * state.energy[p], speed2_scale(state, p)
     if begins:
         active, now = slide.active(lane), slide.walls.at(remaining)
-        # Frames show the speed that is kept across the walls too.
+        # The velocity in frames includes the speed that is kept across the walls.
         along = active.split_at(now, hold.drift(slide.moving(), active, now, r), r, v).along
         if slide.moves() and lane.keep > 0.0:
             slide.cross(i, square(along) + lane.keep * lane.keep - square(v))
@@ -188,7 +188,7 @@ def _load(slide, share, i, p):
 
 @outlined
 def _retire(slide, share, i, phase):
-    """A lane back into its particle, for its next phase."""
+    """Write a lane back to its particle, for the next phase."""
     lanes, state, contacts = slide.lanes, slide.state, slide.state.contacts
     lane, p = lanes.lane(i), index(lanes.particle[i])
     now = slide.walls.at(lane.remaining)

@@ -1,4 +1,4 @@
-"""The particles that slide, one a lane: their rows, and the accounts of what they give to their walls."""
+"""The particles that slide, one in each lane: their rows, and the accounts of impulses and works at their walls."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from ..kernel.record import Record
 from .table import STRIDE, Advanced, Rows, copy_lane, table
 from .watching.counted_lanes import BEGAN
 
-# What a step may end with.
+# The events that end a step.
 LIFTED, MET, FAILED, STOPPED, STUCK, LEAVES, OPENS, ENDS = 1, 2, 4, 8, 16, 32, 64, 128
 # A lane goes on to stay.
 AGAIN = -1
@@ -21,29 +21,29 @@ _named = Rows()
 
 
 class Sliding(Advanced):
-    """A particle that slides, in its lane. Without a second wall the numbers of that are 0."""
+    """A particle that slides, in its lane. Without a second wall the numbers of that wall are 0."""
 
     r, v, a = _named.vector(), _named.vector(), _named.vector()
-    # The numbers of its walls, -1 for none, and how they press on it.
+    # The numbers of its walls, -1 for none, and their forces on it.
     first, second, press, press_second = _named.number(), _named.number(), _named.number(), _named.number()
-    # The time left, the next step, and where a step is cut; how often the step has been cut.
+    # The time left, the next step, the time at which a step is cut, and how often the step has been cut.
     remaining, step, cut, trials = _named.number(), _named.number(), _named.number(), _named.number()
     # The speed that it keeps across the walls, twice its energy, the square of its speed scale.
     keep, twice, scale2 = _named.number(), _named.number(), _named.number()
-    # The particle and the time left when all lanes were looked at last.
+    # The particle and the time left at the last look.
     looked_particle, looked_left = _named.number(), _named.number()
-    # The rows of a particle; those that follow are of the step of a pass.
+    # The rows of a particle; the following rows are of the step in a pass.
     ROWS = _named.count
 
-    # Its length, how far the composition has come, and how the walls press at its end.
+    # Its length, the state of the composition so far, and the forces of the walls at its end.
     h, r1, v1 = _named.number(), _named.vector(), _named.vector()
     press1, press1_second = _named.number(), _named.number()
-    # Its impulses, the work of friction, and twice the work of the second wall, where walls move.
+    # Its impulses, the work of friction, and twice the work of the second wall, for moving walls.
     impulse, impulse_second = _named.number(), _named.number()
     work, given_by_second = _named.number(), _named.number()
-    # By how much it may be off, and by how much the last sweep but one.
+    # The allowed error, and the most by which the last sweep but one may move r1.
     allowed, still = _named.number(), _named.number()
-    # Of the part of the composition under way: w0, the last guess of its end, the direction in which it slides.
+    # For the current part of the composition: w0, the last guess of its end, the direction in which it slides.
     w, end, toward = _named.vector(), _named.vector(), _named.vector()
     # The changes of velocity that the accelerations of the last two parts would make in the whole step.
     change, before = _named.vector(), _named.vector()
@@ -51,24 +51,24 @@ class Sliding(Advanced):
 
 
 class SlidingLanes(Record):
-    """Arrays of one column a lane."""
+    """Arrays with a column for each lane."""
 
     rows: Array  # (Sliding.ALL, stride)
     particle: Array  # int64
-    unsolved: Array  # bool, whether the sweeps of a step go on; at its end, whether it is taken
-    event: Array  # int64, what the step of this pass may end with
-    gained: Array  # twice what walls that move give in the step of this pass, per mass
+    unsolved: Array  # bool, whether the sweeps of a step go on; at its end, whether the step is taken
+    event: Array  # int64, the events of the step in this pass
+    gained: Array  # twice the work of moving walls per mass, in the step of this pass
     after: Array  # twice the energy per mass at its end
-    period: Any  # the cell where it repeats
+    period: Any  # the periodic cell
     openings: Any  # of the walls, or None
-    began: Any = None  # what a lane is before its step, where there are counters
+    began: Any = None  # the state of a lane before its step, where there are counters
 
     def lane(self, i):
         """The rows of a lane."""
         return Sliding(self.rows, i)
 
     def move(self, source, target):
-        """The last live lane into the free slot."""
+        """Move the last live lane to the free slot."""
         copy_lane(self.rows, source, self.rows, target, Sliding.ROWS)
         if self.began is not None:
             copy_lane(self.began, source, self.began, target, BEGAN)
@@ -76,14 +76,14 @@ class SlidingLanes(Record):
 
 
 def empty_sliding(state: Any) -> SlidingLanes:
-    """Lanes for one block of a state."""
+    """Allocate lanes for one block of a state."""
     particle, unsolved, event = np.zeros(STRIDE, np.int64), np.zeros(STRIDE, np.bool_), np.zeros(STRIDE, np.int64)
     began = None if state.crossed is None else table(BEGAN)
     return SlidingLanes(table(Sliding.ALL), particle, unsolved, event, *table(2), state.period, state.openings, began)
 
 
 class Slide(Record):
-    """A call of the kernel of what slides: on which walls, one or two, by which method, and in which lanes."""
+    """A call of the kernel of sliding particles: the kind (one wall or two), the method, and the lanes."""
 
     kind: Any
     method: Any
@@ -91,31 +91,31 @@ class Slide(Record):
     gravity: Any
     state: Any
     lanes: SlidingLanes
-    counts: Any = None  # those of the share
+    counts: Any = None  # `Share.counts`
 
     def phase(self):
-        """The phase of particles that one wall holds, or two."""
+        """The phase of particles held by one wall, or by two."""
         return EDGE if isinstance(self.kind, hold.Two) else HELD
 
     def moving(self):
-        """The walls' numbers where some move, else None."""
+        """The numbers of the walls if some move, else None."""
         return self.method.laws.moving
 
     def moves(self):
-        """Whether a wall moves: a constant for the compiler."""
+        """Whether walls move: a constant for the compiler."""
         return self.moving() is not None
 
     def active(self, lane):
-        """The walls that hold a lane."""
+        """Return the walls that hold a lane."""
         return self.kind.of_lane(lane.first, lane.second)
 
     def force(self, lane, now, r, v):
-        """The force on a lane at a place, from the walls of this instant."""
+        """Return the force on a lane at a place, from the walls of this instant."""
         return slides.force(self.method.laws, self.active(lane), now, self.gravity, r, v)
 
     @outlined
     def with_kept(self, now, lane):
-        """The velocity of a lane with the speed that it keeps across its walls."""
+        """Return the velocity of a lane with the speed that it keeps across its walls."""
         v, keep = lane.v, lane.keep
         if not keep > 0.0:
             return v
@@ -126,7 +126,7 @@ class Slide(Record):
     # --- Accounts
 
     def account(self, i):
-        """Book a step that is taken."""
+        """Book a step that has been taken."""
         lanes, lane = self.lanes, self.lanes.lane(i)
         if not lanes.unsolved[i]:
             return
@@ -145,14 +145,14 @@ class Slide(Record):
             self.counts.stay(self.lanes.lane(i).first, time)
 
     def push(self, i, first, second):
-        """Impulses per mass to the walls that hold a lane."""
+        """Book impulses per mass on the walls that hold a lane."""
         state, lane, p = self.state, self.lanes.lane(i), self.lanes.particle[i]
         state.impulse[self.walls.row(lane.first), p] += first * state.mass[p]
         if lane.second >= 0.0:
             state.impulse[self.walls.row(lane.second), p] += second * state.mass[p]
 
     def work(self, i, twice, second):
-        """Book twice the work per mass of walls that move, and of it that of the second wall."""
+        """Book twice the work per mass of moving walls; `second` of it is of the second wall."""
         state, lane, p = self.state, self.lanes.lane(i), self.lanes.particle[i]
         behind = state.impulse.shape[0] // 2
         state.energy[p] = 0.5 * lane.twice
@@ -161,13 +161,13 @@ class Slide(Record):
             state.impulse[behind + self.walls.row(lane.second), p] += 0.5 * second * state.mass[p]
 
     def cross(self, i, twice):
-        """Book the work of walls where the speed that a lane keeps across them joins its velocity, or leaves it."""
+        """Book the work of the walls when the speed that a lane keeps across them joins its velocity, or leaves it."""
         lane = self.lanes.lane(i)
         lane.twice += twice
         self.work(i, twice, 0.0)
 
     def lose(self, i, twice):
-        """Book twice the energy per mass that a lane has lost; its row knows what is left."""
+        """Book a loss of twice the energy per mass of a lane, which its row has already."""
         state, p = self.state, self.lanes.particle[i]
         state.energy[p] = 0.5 * self.lanes.lane(i).twice
         state.dissipated[p] += 0.5 * twice * state.mass[p]

@@ -1,4 +1,4 @@
-"""The start of a step of a lane that slides, and its end where the step may not be taken as it is."""
+"""The start of a step of a sliding lane, and its end if the step cannot be taken as it is."""
 
 import math
 
@@ -17,17 +17,17 @@ from .sliding import ENDS, FAILED, LEAVES, LIFTED, MET, OPENS, STOPPED, STUCK
 from .sliding_step import SHORTEST, twice_after
 from .sticking import stay
 
-# Times that a step is cut before the lane is given up: it takes four or so.
+# The most cuts of a step before the lane is given up; about four are usual.
 _MOST_TRIALS = 100
-# The first step of a particle that begins to slide, in crossings; the walls correct it.
+# The first step of a particle that begins to slide, in crossings; the walls correct its length.
 _FIRST = 1e-3
-# A step that is tried again is so much shorter.
+# The factor that shortens a step that is tried again.
 _RETRY = 0.25
 
 
 @outlined
 def set_going(slide, i):
-    """The forces on a lane at the start of its next step; its phase then, which may be to rest."""
+    """Compute the forces on a lane at the start of its next step; return its phase, which may be to rest."""
     walls, lanes, lane = slide.walls, slide.lanes, slide.lanes.lane(i)
     r, v, remaining = lane.r, lane.v, lane.remaining
     now = walls.at(remaining)
@@ -57,9 +57,9 @@ def set_going(slide, i):
 
 @outlined
 def decide(slide, i):
-    """The phase of a lane with a step that may not be taken as it is.
+    """Return the phase of a lane with a step that cannot be taken as it is.
 
-    The step is cut where the event is, and taken again, until the event is at its start.
+    The step is cut at the event, and taken again, until the event is at its start.
     """
     method, walls, lanes, lane = slide.method, slide.walls, slide.lanes, slide.lanes.lane(i)
     event, h = lanes.event[i], lane.h
@@ -82,7 +82,7 @@ def decide(slide, i):
             return phase
     if event & MET:
         met = crossing.arrival(walls, active, path, near, lane.remaining)
-        # At once, or so soon that the time left does not change.
+        # The hit is at once, or so soon that the time left does not change.
         if lane.remaining - met.time * h == lane.remaining:
             slide.state.contacts.met[lanes.particle[i]] = met.wall
             lane.r = walls.at(lane.remaining).project(met.wall, r)
@@ -90,7 +90,7 @@ def decide(slide, i):
         cut = min(cut, met.time)
     cut = min(cut, _until_gone(slide, event, active, path, lane.remaining))
     if not cut < 1.0:
-        # It passes near a wall.
+        # The path passes near a wall without a hit.
         return _take(slide, i)
     lane.cut = cut * h
     lane.trials += 1.0
@@ -98,7 +98,7 @@ def decide(slide, i):
 
 
 def _until_gone(slide, event, active, path, remaining):
-    """The part of a step after which a wall ends, or is open, or a cell that repeats does, or infinity."""
+    """Return the part of a step after which a wall ends or is open or the lane leaves the cell, or infinity."""
     lanes, near, found = slide.lanes, crossing.near(slide.method, path.r0), np.inf
     if event & ENDS:
         found = part_until_end(slide.walls, active, path, near, remaining)
@@ -112,7 +112,7 @@ def _until_gone(slide, event, active, path, remaining):
 
 @outlined
 def _past_ends(slide, now, i):
-    """The phase of a lane with walls that may end where it is: on those that follow, or where it flies."""
+    """Return the phase of a lane with walls that may end at its place: on the walls that follow, or FLYING."""
     lane, near = slide.lanes.lane(i), crossing.near(slide.method, slide.lanes.lane(i).r)
     for _wall in range(2):
         ended = ended_wall(now, slide.active(lane), lane.r, near)
@@ -133,7 +133,7 @@ def _past_ends(slide, now, i):
 
 
 def _stop(slide, i):
-    """Friction has stopped a lane."""
+    """Stop a lane by friction."""
     lane, r, u, given = slide.lanes.lane(i), slide.lanes.lane(i).r, ZERO, 0.0
     if slide.moves():
         u = slide.walls.at(lane.remaining).velocity(lane.first, r)
@@ -141,7 +141,7 @@ def _stop(slide, i):
         given = twice - lane.twice + lost
         lane.twice = twice
     else:
-        # All that is above the potential energy, down to what round-off has added to the kinetic one.
+        # All energy above the potential energy is lost, including the round-off of the kinetic energy.
         lost = lane.twice - 2.0 * potential(slide.gravity, r)
         lane.twice -= lost
     lane.keep = 0.0
@@ -152,7 +152,7 @@ def _stop(slide, i):
 
 
 def _take(slide, i):
-    """Take a step after all."""
+    """Take a step that ends without an event."""
     lanes, lane = slide.lanes, slide.lanes.lane(i)
     lane.r, lane.v, lane.remaining, lane.cut = lane.r1, lane.v1, lane.remaining - lane.h, np.inf
     lane.twice = twice_after(slide, lane.twice - lane.work, lanes.after[i])
@@ -162,13 +162,13 @@ def _take(slide, i):
 
 
 def _give_up(slide, i):
-    """Leave a lane to the careful way: it is at an apex, or where the walls have no edge."""
+    """Leave a lane to the careful way: it is at an apex, or its walls have no edge there."""
     slide.state.contacts.met[slide.lanes.particle[i]] = slide.lanes.lane(i).first
     return CAREFUL
 
 
 def _shorten(slide, i):
-    """A lane, its step without a solution: a shorter one, or none over the edge of a solid, beyond which is no wall."""
+    """Shorten a step without a solution, or let the lane fly over the edge of a solid, if there is no wall beyond."""
     lane, h = slide.lanes.lane(i), slide.lanes.lane(i).h
     lane.step, lane.cut = _RETRY * h, np.inf
     if h > SHORTEST * slide.method.size / math.sqrt(lane.scale2):
@@ -182,7 +182,7 @@ def _shorten(slide, i):
 
 
 def _lift(phase, lane, none):
-    """The phase of a lane that its walls let go now, or the part of the step after which they do: (phase, part)."""
+    """Return (the phase of a lane that walls let go now, the part of the step after which they let go)."""
     first, second = lane.press <= none, lane.press_second <= none
     part = _part(lane.press, lane.press1)
     if phase == HELD:
@@ -197,5 +197,5 @@ def _lift(phase, lane, none):
 
 
 def _part(start, end):
-    """The place where a straight line from `start` falls through 0, if it does."""
+    """Return the place where a straight line from `start` falls through 0, or 1."""
     return start / (start - end) if end < 0.0 else 1.0

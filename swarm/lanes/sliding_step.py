@@ -1,4 +1,4 @@
-"""One composed step of every lane that slides: loops without branches, and what the step may end with."""
+"""One composed step of every sliding lane, in loops without branches, and the events at its end."""
 
 import math
 
@@ -15,14 +15,14 @@ from ..kernel.vector import ZERO, either, square
 from ..surfaces.periodic.period import is_beyond
 from .sliding import ENDS, FAILED, LEAVES, LIFTED, MET, OPENS, STOPPED, STUCK
 
-# A step of this part of a crossing, or of the size, is the shortest.
+# The shortest step, as a fraction of a crossing, and the shortest way, as a fraction of the size.
 SHORTEST, _NO_WAY = 1e-10, 1e-15
-# Friction has stopped a particle where this part of |v|^2 is left.
+# Friction has stopped a particle when at most this fraction of |v|^2 is left.
 SLOWEST = 1e-24
 
 
 def compose(slide, live):
-    """One composed step of every live lane, from its r, v and a to its r1 and v1."""
+    """Make one composed step of every live lane, from r, v and a to r1 and v1."""
     walls, gravity, lanes = slide.walls, slide.gravity, slide.lanes
     friction, moving = slide.method.laws.friction, slide.moving()
     rubs = friction is not None
@@ -78,14 +78,14 @@ def compose(slide, live):
 
 
 def _start(slide, i):
-    """The length of the step of a lane, its allowed error, and its start."""
+    """Set the length of the step of a lane, its allowed error, and its start."""
     lane, method = slide.lanes.lane(i), slide.method
     v, a, r = lane.v, lane.a, lane.r
     h = select(lane.step < lane.remaining, lane.step, lane.remaining)
     h = select(lane.cut < h, lane.cut, h)
     stop = _longest(slide, lane)
     h = select(stop < h, stop, h)
-    # The tolerance is that of a crossing at the speed, or in the pull along the walls, that the particle has now.
+    # The tolerance is for a crossing at the present speed, or in the present pull along the walls.
     speed = math.sqrt(0.5 * (square(v) + math.sqrt(square(a)) * method.size))
     lane.h, lane.allowed = h, method.sliding_tolerance * speed * h
     taken = accelerated(slide.gravity, ZERO, 1.0) - a
@@ -96,7 +96,7 @@ def _start(slide, i):
 
 
 def _longest(slide, lane):
-    """A time within which a lane that slides with friction surely does not stop on its first wall."""
+    """Return a time within which a lane that slides with friction surely does not stop on its first wall."""
     now, r, v, a = slide.walls.at(lane.remaining), lane.r, lane.v, lane.a
     if slide.moves():
         v, a = v - now.velocity(lane.first, r), a - now.acceleration(lane.first, r)
@@ -104,13 +104,13 @@ def _longest(slide, lane):
 
 
 def _when(lane, k):
-    """The time that remains of the frame at the start and at the end of part k."""
+    """Return the time left of the frame at the start and at the end of part k."""
     remaining, h = lane.remaining, lane.h
     return remaining - slides.before(k) * h, remaining - (slides.before(k) + slides.part(k)) * h
 
 
 def _sweep_lane(slide, i, k):
-    """One sweep of a lane that still moves: whether it needs another."""
+    """Make one sweep of a lane that still moves; return whether it needs another."""
     lane, unsolved = slide.lanes.lane(i), slide.lanes.unsolved
     end, step, h = lane.end, slide.walls.during(*_when(lane, k)), slides.part(k) * lane.h
     swept = slides.sweep(slide.moving(), slide.active(lane), step, h, (lane.r1, end, lane.w), lane.still)
@@ -125,7 +125,7 @@ def _sweep_lane(slide, i, k):
 
 
 def end_steps(slide, live):
-    """Take the steps that are as exact as asked and end without an event; lengthen or shorten the next."""
+    """Take the steps that are exact enough and end without an event; lengthen or shorten the next steps."""
     for i in range(live):
         _end_step(slide, i)
 
@@ -141,7 +141,7 @@ def _end_step(slide, i):
     rest = 2.0 * potential(gravity, r1) + keep * keep
     twice = twice_after(slide, lane.twice - lane.work, square(v1) + rest)
     if not slide.moves():
-        # Walls at rest leave the speed that the energy says.
+        # Walls at rest leave the speed that follows from the energy.
         v1 = slides.restored(v1, twice - rest, scale2)
     force = slide.force(lane, now, r1, v1)
     ratio = slides.error(h, (r0, v0, a0), (r1, v1, force.acceleration), lane.allowed)
@@ -156,8 +156,8 @@ def _end_step(slide, i):
     happened |= select(ends, ENDS, 0) | select(opens, OPENS, 0)
     lanes.event[i] |= select(good, happened, 0)
     lanes.unsolved[i] = fine
-    # What the end of the frame or an event cuts says nothing of the length; and a step that is to be cut must be
-    # found so again after a halt.
+    # A step cut by the end of the frame or an event gives no length; a step that is to be cut must be the same again
+    # after a halt.
     whole = (fine & (h == lane.step)) | (not (ratio <= 1.0))
     lane.step = select(whole, slides.next_step(h, ratio), lane.step)
     lane.cut = select(fine, np.inf, lane.cut)
@@ -171,7 +171,7 @@ def _end_step(slide, i):
     if method.laws.friction is not None:
         slip = relative(wall_velocity(moving, now, lane.first, r1), v1)
         lanes.event[i] |= select(fine & (square(slip) <= SLOWEST * scale2), STOPPED, 0)
-    # Near an apex steps become shorter without end, in time or, of a slow particle, in length.
+    # Near an apex steps become shorter without end, in time or, for a slow particle, in length.
     step = lane.step
     way2 = step * step * (square(v1) + step * step * square(accelerated(gravity, ZERO, 1.0)))
     short = (step < SHORTEST * method.size / math.sqrt(scale2)) | (way2 < (_NO_WAY * method.size) ** 2)
@@ -179,5 +179,5 @@ def _end_step(slide, i):
 
 
 def twice_after(slide, kept, now):
-    """Twice the energy per mass after a step: that of before, or all there is where walls do work."""
+    """Return twice the energy per mass after a step: `kept` if walls do no work, else `now`."""
     return now if slide.moves() else kept

@@ -1,6 +1,6 @@
-"""The unknown of every lane's contact: Newton's sweeps, and around them Uzawa's loop (8) where there are multipliers.
+"""Solve for the unknown of every lane's contact: Newton's sweeps, within Uzawa's loop (8) where there are multipliers.
 
-Each sweep is one loop over all lanes without branches; lanes that are solved stand still until the last one is.
+Each sweep is one loop over all lanes without branches; solved lanes stand still until the last one is solved.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from ..methods import contract as methods
 
 
 def solve(method, walls, gravity, multipliers, lanes, live):
-    """The contact's unknown of every lane, its multiplier where the method has one, and the velocity where it turns."""
+    """Solve for the unknown of every contact, its multiplier if the method has one, and the velocity if it turns it."""
     if method.most_sweeps(walls) > 0:
         for i in range(live):
             here = lanes.faced(walls, i)
@@ -25,7 +25,7 @@ def solve(method, walls, gravity, multipliers, lanes, live):
     _newton(method, walls, gravity, multipliers, lanes, live)
     if multipliers is not None:
         _sweep_multipliers(multipliers, method, walls, gravity, lanes, live)
-    # The velocity after the contact, where one loop with the rest of the contact would be too long.
+    # The velocity after the contact has its own loop: one loop with the rest of the contact would be too long.
     if method.turns:
         for i in range(live):
             turned = method.turn(lanes.faced(walls, i), gravity, lanes.given(method, i), lanes.wall[i], lanes.kappa[i])
@@ -34,7 +34,7 @@ def solve(method, walls, gravity, multipliers, lanes, live):
 
 
 def solution(method, lanes, i):
-    """The `Solution` of a lane: nothing where contacts have a closed form."""
+    """Return the `Solution` of a lane, empty for contacts in closed form."""
     if method.solves is None:
         return methods.Solution(0.0, False, methods.NOT_TURNED)
     turned = methods.NOT_TURNED
@@ -44,7 +44,7 @@ def solution(method, lanes, i):
 
 
 def _newton(method, walls, gravity, multipliers, lanes, live):
-    """Sweeps of the inner solve, until the last lane is solved."""
+    """Make sweeps of the inner solve, until the last lane is solved."""
     kappa, unsolved, record = lanes.kappa, lanes.unsolved, lanes.record
     for _sweep in range(method.most_sweeps(walls)):
         remaining = 0
@@ -67,7 +67,7 @@ def _newton(method, walls, gravity, multipliers, lanes, live):
 
 
 def _begin_multipliers(method, walls, gravity, lanes, live):
-    """The start of the loop (8) of every lane that has a contact."""
+    """Start the loop (8) of every lane that has a contact."""
     kappa, record = lanes.kappa, lanes.record
     for i in range(live):
         record[MULTIPLIER, i], kappa[i], record[ACCELERATION, i] = method.first_multiplier(
@@ -79,7 +79,7 @@ def _begin_multipliers(method, walls, gravity, lanes, live):
 
 
 def _sweep_multipliers(multipliers, method, walls, gravity, lanes, live):
-    """Sweeps of the loop (8), until the last lane has converged."""
+    """Make sweeps of the loop (8), until the last lane has converged."""
     for _sweep in range(method.multiplier_sweeps):
         if _update_multipliers(method, lanes, live) == 0:
             break
@@ -89,7 +89,7 @@ def _sweep_multipliers(multipliers, method, walls, gravity, lanes, live):
 
 
 def _update_multipliers(method, lanes, live):
-    """The end of a sweep of the loop (8): how many lanes need another."""
+    """End a sweep of the loop (8); return the number of lanes that need another."""
     record, kappa, unsolved, sweeping = lanes.record, lanes.kappa, lanes.unsolved, lanes.sweeping
     remaining = 0
     for i in range(live):
@@ -102,7 +102,7 @@ def _update_multipliers(method, lanes, live):
         record[BEFORE, i] = select(going, old, kept(record[BEFORE, i]))
         record[MISS, i] = select(going, miss, kept(record[MISS, i]))
         record[SWEEPS, i] += select(going, 1.0, 0.0)
-        # What the inner solve left unsolved is for the careful way, at once.
+        # A lane that the inner solve left unsolved goes to the careful way at once.
         going = going & more & (not unsolved[i])
         # The first Newton step for the new multiplier needs no evaluation.
         kappa[i] += select(going, record[GAIN, i] * (new - old), 0.0)
@@ -115,7 +115,7 @@ def _update_multipliers(method, lanes, live):
 
 @outlined
 def count_sweeps(multipliers, lanes, live):
-    """Add the records of the lanes that had a contact to their particles; nothing where there are no multipliers."""
+    """Add the records of the lanes that had a contact to their particles; do nothing without multipliers."""
     if multipliers is None:
         return
     record = lanes.record
@@ -131,7 +131,7 @@ def count_sweeps(multipliers, lanes, live):
 
 @outlined
 def keep_failure(multipliers, lanes, i):
-    """Keep the record of the lane that failed, for the error."""
+    """Keep the record of the lane that failed, for the message of the error."""
     if multipliers is None:
         return
     particle = lanes.particle[i]

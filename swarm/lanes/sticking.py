@@ -1,6 +1,6 @@
-"""Particles that rest where walls move: each goes with its wall as long as friction, or a balance of forces, holds it.
+"""Particles at rest on moving walls: each moves with its wall while friction, or a balance of forces, holds it.
 
-Until then another wall may come, and strike it.
+Before that ends another wall may come and strike it.
 """
 
 from ..contact import crossing, hold
@@ -14,18 +14,18 @@ from ..kernel.vector import ZERO, norm, square
 from .sliding import AGAIN
 from .sliding_step import SLOWEST
 
-# Halvings of the interval in which a wall lets a particle go that rests on it.
+# Halvings of the interval in which a wall lets go of a particle at rest.
 _HALVINGS = 60
-# So many paces it stays at a time, and is asked again: a frame may have millions of them, and between them halts count.
-# (Rejected: a halt in any of them. What is carried in two parts is rounded twice.)
+# The most paces at a time before the lane is checked again: a frame may have millions, and halts count between them.
+# (Rejected: a halt in any of them. Motion with a wall in two parts is rounded twice.)
 _MOST_PACES = 128.0
-# Steps in the search for another wall that comes. A wall that is not found after so many is too near to be resolved;
-# after so many of all paces it is asked again too.
+# Steps in the search for another wall that comes. A wall that is not found after this number is too near to be
+# resolved; after this number in all paces the lane is also checked again.
 _MOST_STEPS = 1e4
 
 
 class Clear(Record):
-    """Until when no other wall is met, the wall that is met then, or -1, and how many steps the search took."""
+    """The time until which no other wall is met, the wall that is met then, or -1, and the steps of the search."""
 
     time: float
     wall: float
@@ -34,7 +34,7 @@ class Clear(Record):
 
 @outlined
 def stay(slide, i):
-    """The phase of a lane that moves with its walls as long as friction, or a balance of forces, holds it there."""
+    """Move a lane with its walls while friction, or a balance of forces, holds it there; return its phase."""
     walls, lanes, contacts, lane = slide.walls, slide.lanes, slide.state.contacts, slide.lanes.lane(i)
     remaining, first = lane.remaining, lane.first
     now = walls.at(remaining)
@@ -51,7 +51,7 @@ def stay(slide, i):
         middle = 0.5 * (low + high)
         if not (_rests_later(slide, lane, middle) and _rests_later(slide, lane, high)):
             break
-        # Simpson's rule for what presses
+        # Simpson's rule for the impulses
         one, two, three = tuple(_press_later(slide, lane, t) for t in (low, middle, high))
         pressed += (one.n + 4.0 * two.n + three.n) * ((high - low) / 6.0)
         pressed_second += (one.m + 4.0 * two.m + three.m) * ((high - low) / 6.0)
@@ -99,7 +99,7 @@ def _rubs(slide, now, lane, slowest):
 
 @outlined
 def _clear(slide, lane, low, high):
-    """`Clear` of a lane that moves with its first wall, from one time to another."""
+    """Return the `Clear` of a lane that moves with its first wall, from one time to another."""
     walls, remaining, active = slide.walls, lane.remaining, slide.active(lane)
     near = crossing.near(slide.method, lane.r)
     time, step, met, steps = low, high - low, -1.0, 0.0
@@ -117,19 +117,19 @@ def _clear(slide, lane, low, high):
         if found.time == 0.0 or not remaining - end < remaining - time:
             break
         step = (end - time) * min(found.time, 0.5)
-    # A path that no wall is found on, however short, is clear of them.
+    # A path on which no wall is found, however short, is clear of walls.
     return Clear(time, met, steps) if met >= 0.0 else Clear(high, -1.0, steps)
 
 
 @outlined
 def _carried(walls, lane, t):
-    """The place after a time of a lane that moves with its first wall."""
+    """Return the place of a lane after a time t in which it moves with its first wall."""
     return walls.during(lane.remaining, lane.remaining - t).carry(lane.first, lane.r)
 
 
 @outlined
 def _way(walls, lane, start, end):
-    """The way of a lane that moves with its first wall, from one time to another."""
+    """Return the path of a lane that moves with its first wall, from one time to another."""
     r0, r1 = _carried(walls, lane, start), _carried(walls, lane, end)
     v0 = walls.at(lane.remaining - start).velocity(lane.first, r0)
     v1 = walls.at(lane.remaining - end).velocity(lane.first, r1)
@@ -138,7 +138,7 @@ def _way(walls, lane, start, end):
 
 @outlined
 def _rests(slide, now, lane, r):
-    """Whether a lane that moves with its first wall goes on to do so from here."""
+    """Whether a lane that moves with its first wall continues to do so from here."""
     force, acceleration = _force_at_rest(slide, now, lane, r), now.acceleration(lane.first, r)
     pull = norm(accelerated(slide.gravity, ZERO, 1.0)) + norm(acceleration)
     pressed = not slide.kind.lets_go(force.n, force.m)
@@ -147,7 +147,7 @@ def _rests(slide, now, lane, r):
 
 @outlined
 def _force_at_rest(slide, now, lane, r):
-    """The force on a lane at r that moves with its first wall."""
+    """Return the force on a lane at r that moves with its first wall."""
     return slide.force(lane, now, r, now.velocity(lane.first, r))
 
 

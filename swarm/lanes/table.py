@@ -14,17 +14,17 @@ from ..kernel.vector import column, put
 LANES = 256
 # The row stride is not a power of two, so that the rows of a lane do not share a cache set.
 STRIDE = 264
-# Bytes of a line of the cache, and of a number of eight flags.
+# Bytes of a cache line, and of a number of eight flags.
 _LINE, EIGHT = 64, 8
-# After so many passes lanes are looked at. A particle that has moved on since by less than this part of the time left
-# would need 1e9 passes, and is given up if it got nowhere.
+# The passes between two looks at all lanes. A particle that has advanced since the last look by less than the fraction
+# MOVED of the time left would need 1e9 passes, and is given up if it made no progress.
 LOOK, MOVED = 1024, 1e-6
 
 with_distances = spaced(STRIDE)
 
 
 class Number:
-    """A row, as an attribute of the view (rows, i) of a lane; of its class it is the row."""
+    """A row, as an attribute of the view (rows, i) of a lane; as an attribute of the class it is the row itself."""
 
     def __init__(self, row: int) -> None:
         self.row = row
@@ -47,22 +47,22 @@ class Vector(Number):
 
 
 class Rows:
-    """Names the rows of a table one after another; `count` are named so far."""
+    """Name the rows of a table one after another; `count` of them have a name so far."""
 
     def __init__(self) -> None:
         self.count = 0
 
     def take(self, count: int) -> int:
-        """So many rows: the first of them."""
+        """Take `count` rows; return the first of them."""
         self.count += count
         return self.count - count
 
     def number(self) -> Any:
-        """The next row."""
+        """Take the next row."""
         return Number(self.take(1))
 
     def vector(self) -> Any:
-        """The next three rows."""
+        """Take the next three rows."""
         return Vector(self.take(3))
 
 
@@ -74,20 +74,20 @@ class LaneView(Record):
 
 
 class Advanced(LaneView):
-    """The lane of a particle on its way: its rows say where it was when all lanes were looked at last."""
+    """The lane of a particle on its way, with its state at the last look in rows."""
 
     def stands(self, method, p):
-        """Whether particle p, of this lane, has not gone on by what it must since a look."""
+        """Whether particle p of this lane has advanced less than it must since the last look."""
         least = min(method.instant(self.v), MOVED * self.remaining)
         return self.looked_particle == p and least >= self.looked_left - self.remaining
 
     def look(self, p):
-        """Keep what the next look asks for."""
+        """Keep the state for the next look."""
         self.looked_particle, self.looked_left = p, self.remaining
 
 
 def table(rows: int) -> NDArray[np.float64]:
-    """Rows of numbers that begin with a line of the cache, so that no vector reaches into two of them."""
+    """Return rows of numbers that begin with a cache line, so that no vector reaches into two lines."""
     size = 8 * rows * STRIDE
     memory = np.zeros(size + _LINE, np.uint8)
     first = -memory.__array_interface__["data"][0] % _LINE
@@ -95,20 +95,20 @@ def table(rows: int) -> NDArray[np.float64]:
 
 
 def copy_lane(source, i, target, k, count):
-    """The first rows of lane i of a table into lane k of another."""
+    """Copy the first `count` rows of lane i of a table to lane k of another."""
     for row in range(count):
         target[row, k] = source[row, i]
 
 
 def whole_eights(n):
-    """The least number of whole vectors, in lanes, that so many lanes fit in."""
+    """Return the least number of lanes, in whole vectors, that n lanes fit in."""
     return index((index(n) + index(EIGHT - 1)) // EIGHT * EIGHT)
 
 
 def marked_lanes(lanes, live):
-    """The number of marked lanes; which they are is in `order`.
+    """Count the marked lanes, and write their numbers to `order`.
 
-    Without a branch: which lanes arrive no processor foresees, and each wrong guess costs some 6 ns. All lanes one by
+    Without a branch: no processor foresees which lanes arrive, and each wrong guess costs about 6 ns. All lanes one by
     one were an eighth of the time of a frame with 75 impacts.
     """
     marked, order, some, count = lanes.marked, lanes.order, lanes.some, index(0)

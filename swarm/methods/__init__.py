@@ -1,9 +1,9 @@
-"""The methods by their kind in a scene file.
+"""The methods by their kinds in a scene file.
 
 To add one, write a file here with a dataclass derived from `Method`, for users, and a record derived from
-`MethodNumbers` of contract.py, for kernels: what a lane keeps (`constants`, `own`), the way to the next contact (`land`
-or `flight`), and `contact` in lanes; what needs branches and loops is `hard_pass`. Then name the class in ALL_METHODS
-below. examples/own_method.py is a complete method.
+`MethodNumbers` of contract.py, for kernels: the numbers of a lane (`constants`, `own`), the way to the next contact
+(`land` or `flight`), and `contact` in lanes; the part with branches and loops is `hard_pass`. Then name the class in
+ALL_METHODS below. examples/own_method.py is a complete method.
 """
 
 from typing import TYPE_CHECKING, Any

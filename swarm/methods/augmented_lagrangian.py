@@ -41,26 +41,26 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
     surface.
 
     With an exponent above 1 it does not converge in a useful number of sweeps, as Phi'(0) = 0: lambda grows without
-    end, and V falls only as a power of the sweeps. Such walls are for Penalty, as Hertz's law is.
+    end, and V falls only as a power of the number of sweeps. Use `Penalty` for such walls, for example Hertz's law.
 
     In an edge sharper than about 0.1 rad the sweeps over its walls are too many: use on_unconverged="impact". The
-    converged step is a reflection about D: `Impact(contact_step=dt)` takes it without the loop, at a twentieth of the
+    converged step is a reflection about D: `Impact(contact_step=dt)` computes it without the loop at a twentieth of the
     cost and to round-off. This method is for the paper's results, and for studies of multipliers.
 
-    What does it converge to? With dt -> 0 to the rigid wall, `Impact()`, of first order in dt, on every surface: the
-    step begins at the impact, and at its end the particle is (dt/2)(v0 - v1) from where it would be. A sweep divides
-    the gap by about 1 + alpha dt^2/(4 m), so the penalty must grow as 1/dt^2, or the sweeps as 1/dt^2.
+    What does it converge to? With dt -> 0 to the rigid wall, `Impact()`, with first order in dt, on every surface: the
+    step begins at the impact, and its end is (dt/2)(v0 - v1) from the exact place. A sweep divides
+    the gap by about 1 + alpha dt^2/(4 m), so the penalty, or the number of sweeps, must grow as 1/dt^2.
 
     With contact_start="centred" the step begins dt/2 before the impact, inside, where the loop of the paper has no
-    limit. The gap is that from the level of its start, g - g0, in Phi and in V: the step is in State I of the surface
-    phi = phi(r0), as it would be in a cavity that much smaller, and D is the discrete gradient of that gap. The limit
-    is the reflection about D(r0, r1) with g1 = g0, so energy is kept as from the wall. It is the step of
-    `Impact(contact_step=dt, contact_start="centred")`; its docstring says where it is exact. Also first order in
-    general, with an error that is several times smaller. A step without length is the exact reflection.
+    limit. Phi and V take the gap from the level of its start, g - g0: the step is in State I of the surface
+    phi = phi(r0), as it would be in a cavity smaller by this gap, and D is the discrete gradient of the gap. The limit
+    is the reflection about D(r0, r1) with g1 = g0, so energy is conserved as from the wall. It is the step of
+    `Impact(contact_step=dt, contact_start="centred")`; its docstring says where it is exact. Its order is also one in
+    general, with an error several times smaller. A step of zero length is the exact reflection.
 
-    Of bodies the multipliers hold walls and links together, with exponent 1 and adaptive=True: V is the sum of
+    For bodies the multipliers hold walls and links together, with exponent 1 and adaptive=True: V is the sum of
     alpha g^2/2 of contacts and alpha c^2/2 of links, c = (|y|^2 - l^2)/(2 l). A step shorter than dt, cut at an impact,
-    has the penalty alpha (dt/h)^2, since a sweep shrinks errors by alpha h^2/m. The converged one is Impact(dt=...).
+    has the penalty alpha (dt/h)^2, since a sweep shrinks errors by alpha h^2/m. The converged step is Impact(dt=...).
 
     Args:
         dt: step h > 0 [s]. Frames must fall on whole steps, unless adaptive.
@@ -72,8 +72,8 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
         gradient: "composite", or "mean-value", which is the paper's general form, slow, and needs exponent > 1.
         adaptive: cut each step at the instant of impact (the paper's recommendation); flights are then exact over any
             time, and contact steps are dt long. A step with another wall in its way is replaced by the exact
-            reflection, and so is one that ends beyond the body, the face or the side that it is with, of fields, meshes
-            and outlines: these need it. Without gravity only.
+            reflection. So is one that ends beyond its body of a field, its face of a mesh, or its side of an outline:
+            these surfaces need adaptive=True. Without gravity only.
         acceleration: "none" is the paper's loop; "secant" replaces (8) by a secant; "reflection" starts the secant from
             the multiplier of the converged step. All have the same fixed point; where it does not exist, all use (8).
         on_unconverged: what happens if a loop ends above the tolerance. "raise" ends the run and names step,
@@ -90,7 +90,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
     impacts; flights are exact (`python -m bench order`). Cost: sweeps times a scalar solve; the sweeps are in the
     observable "sweeps".
     Laws of walls, openings and doors are those of `Penalty`: laws act where a contact ends.
-    In unions of several rooms, and in foams, a step that is cut at an impact takes the walls of the room that it is in.
+    In unions of several rooms, and in foams, a step that is cut at an impact meets the walls of its own room.
     Walls may move in fixed steps, which are taken in the frame of each wall; steps that are cut at
     impacts, and exact impacts in their place, need walls at rest.
     Source: García Orden & Ortega 2007, eqs. (6)-(9), and the composite form of contact/discrete_gradient.py.
@@ -115,7 +115,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
             self._require_centred()
 
     def _require_centred(self) -> None:
-        """Raise a `SceneError` where the other arguments leave no step that is centred about an impact."""
+        """Raise a `SceneError` if the other arguments do not allow a step that is centred about an impact."""
         if not self.adaptive:
             raise SceneError(
                 'adaptive must be True with contact_start = "centred", got False: steps of fixed length begin at any '
@@ -124,7 +124,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
         if self.exponent != 1.0:
             raise SceneError(
                 f'exponent must be 1 with contact_start = "centred", got {self.exponent:g}: the loop ends on the level '
-                "on which the step begins for no other; leave exponent out, or contact_start"
+                "of the start of the step only for 1; leave exponent out, or contact_start"
             )
 
     def check(self, scene: Scene, particles: Particles) -> None:
@@ -164,7 +164,7 @@ class AugmentedLagrangian(fixed_step.SoftWalls):
         return CUT if self.adaptive else type(self).__name__
 
     def time_of_impact(self) -> float | None:
-        # A centred step is a part of the flights before and after it.
+        # A centred step replaces a part of the flights before and after it.
         return (0.0 if self.contact_start == "centred" else self.dt) if self.adaptive else None
 
     def span(self, name: str, duration: float) -> float:

@@ -1,4 +1,4 @@
-"""The description of a method for users, checked. Methods as kernels take them are in contract.py."""
+"""The description of a method for users, checked. The form for kernels is in contract.py."""
 
 import math
 import warnings
@@ -16,11 +16,11 @@ from ..scene import Scene
 from ..surfaces import required
 from ..surfaces.in_motion.moving import lacks_bend
 
-# Of an argument that methods of older files lack: tables leave it out at its default, so that they are the same.
+# Marks an argument that older files do not have: tables omit it at its default, so that these files stay the same.
 YOUNGER = {"younger": True}
-# Where a contact step begins: at the impact, or half of it before.
+# Where a contact step begins: at the impact, or half of the step before it.
 ContactStart = Annotated[str, choice("impact", "centred")]
-# Default shortest flight as a part of the crossing time size/|v|.
+# Default shortest flight as a fraction of the crossing time size/|v|.
 SHORTEST = 1e-4
 
 
@@ -39,35 +39,35 @@ class Method(Validated):
         """Raise a `SceneError` if this method cannot run this scene with these particles."""
 
     def needs(self, scene: Scene) -> tuple[Any, ...]:
-        """The functions of surfaces/contract.py that its kernels ask of every wall."""
+        """The functions of surfaces/contract.py that its kernels call for every wall."""
         return ()
 
     def numbers(self, scene: Scene) -> Any:
-        """The record of numbers that kernels take in place of this description."""
+        """Return the record of numbers that kernels take in place of this description."""
         raise NotImplementedError
 
     def apart(self) -> str | None:
-        """The `apart` of `CompiledScene`: a name where the method does not take listed solids as a field, else None."""
+        """The `apart` of `CompiledScene`: a name if the method does not take listed solids as a field, else None."""
         return type(self).__name__
 
     def time_of_impact(self) -> float | None:
-        """The duration of an impact besides the flight to it [s]; None where a frame costs steps, not impacts."""
+        """The duration of an impact besides the flight to it [s]; None if the cost of a frame is steps, not impacts."""
         return None
 
     def span(self, name: str, duration: float) -> float:
-        """`duration` [s] in the unit in which the kernel counts a frame down; `name` is for the error."""
+        """Return `duration` [s] in the unit in which the kernel counts a frame down; `name` is for errors."""
         return duration
 
     def birth_times(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The times at which particles come that sources give at these times [s]."""
+        """Return the times [s] at which the method starts particles that sources give at `times` [s]."""
         return times
 
     def parts(self, durations: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Durations from such a time to the end of a frame [s] in the unit in which the kernel counts it down."""
+        """Return durations from a birth to the end of a frame [s] in the unit in which the kernel counts it down."""
         return durations
 
     def instant(self, moment: float) -> float:
-        """The time of the method when a frame ends at `moment` [s]: where walls that move are then."""
+        """Return the time of the method when a frame ends at `moment` [s], for the places of moving walls."""
         return moment
 
     def is_rigid(self) -> bool:
@@ -75,7 +75,7 @@ class Method(Validated):
         return False
 
     def supports_period(self) -> bool:
-        """Whether its flights end where a particle leaves a cell that repeats, and its contacts do not move."""
+        """Whether its flights end where a particle leaves a periodic cell, and its contacts do not move particles."""
         return False
 
     def has_multipliers(self) -> bool:
@@ -83,23 +83,23 @@ class Method(Validated):
         return False
 
     def is_explicit(self) -> bool:
-        """Whether its steps gain energy without bound where they are too long for a linear spring."""
+        """Whether its steps gain energy without bound if they are too long for a linear spring."""
         return False
 
     def may_slide(self) -> bool:
-        """Whether a particle may stay on its walls: then the kernels of sliding are compiled at the first one."""
+        """Whether a particle may stay on its walls: the kernels of sliding are then compiled at the first one."""
         return False
 
     def seldom_hard(self, scene: Scene) -> bool:
-        """Whether most runs meet no contact for `hard_pass`: then the slow-path kernel is compiled at the first one."""
+        """Whether most runs have no contact for `hard_pass`: its kernel is then compiled at the first such contact."""
         return False
 
     def failure(self, moment: float, remaining: float, sweeps: int, stored: float, mass: float) -> str:
-        """The end of the sentence about a loop that did not converge in the frame that ends at `moment`."""
+        """Return the end of the message about a loop that did not converge in the frame that ends at `moment`."""
         raise NotImplementedError
 
     def too_fast(self, scene: Scene) -> str:
-        """The end of the sentence about a step that could jump over a solid."""
+        """Return the end of the message about a step that could jump over a solid."""
         raise NotImplementedError
 
     def law(self) -> Any:
@@ -108,15 +108,15 @@ class Method(Validated):
 
 
 def check_surfaces(method: Method, scene: Scene) -> None:
-    """Raise a `SceneError` if a surface does not give what the method, or what is observed, asks of it."""
+    """Raise a `SceneError` if a surface lacks a function that the method, or an observable, needs."""
     purpose = type(method).__name__ + (" without gravity" if scene.gravity is None else " under gravity")
-    # `escaped` asks where flights without gravity end.
+    # `escaped` needs the ends of flights without gravity.
     seen = ("first_hit",) if scene.is_open() and scene.gravity is None else ()
     required.require(scene.surfaces, purpose, (*method.needs(scene), "distance", *seen))
 
 
 def check_bends(scene: Scene) -> None:
-    """Raise a `SceneError` if a surface moves so that it is met by safe steps, and does not bound its bend."""
+    """Raise a `SceneError` if a surface with a motion that needs safe steps does not bound its bend."""
     for i, surface in scene.pieces.owned():
         if lacks_bend(surface):
             raise SceneError(
@@ -126,9 +126,9 @@ def check_bends(scene: Scene) -> None:
 
 
 def check_crossing(name: str, step: float | None, scene: Scene, particles: Particles) -> None:
-    """Raise a `SceneError` if the fastest particle crosses the scene in less than a contact step of this length."""
+    """Raise a `SceneError` if the fastest particle crosses the scene in less than the contact step `step`."""
     if not step:
-        return  # nothing that the speeds have to be looked at for
+        return  # no step: the speeds do not matter
     fastest = particles.fastest()
     crossing = scene.size() / fastest if fastest > 0.0 else math.inf
     if step > crossing:
@@ -138,9 +138,9 @@ def check_crossing(name: str, step: float | None, scene: Scene, particles: Parti
 
 
 def centred_half(longest, lane):
-    """Half the length of a contact step of at most this length with its middle at the end of the flight of a lane.
+    """Return half the length of a contact step of at most `longest`, with its middle at the end of a lane's flight.
 
-    It begins no sooner than that flight, which is where the frame begins or the contact before ends, and ends within
+    It begins at the earliest with this flight, which starts with the frame or after the last contact, and ends within
     the frame.
     """
     half = select(0.5 * longest < lane.flown, 0.5 * longest, lane.flown)

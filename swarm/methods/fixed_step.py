@@ -1,4 +1,4 @@
-"""The common part of methods with a fixed step: whole steps, the jump over free ones, solids that a step could miss."""
+"""The common part of methods with a fixed step: whole steps, jumps over free steps, solids that a step could miss."""
 
 import math
 from dataclasses import dataclass
@@ -29,16 +29,16 @@ from ..surfaces.surface import Surface
 from ..surfaces.time_of_impact import flights, safe
 from . import base, contract
 
-# A frame may miss a whole number of steps by this part of a step: decimal times are not binary ones.
+# A frame may miss a whole number of steps by this part of a step, as decimal times are not binary numbers.
 _WHOLE = 1e-6
-# More steps than this are not counted exactly.
+# A larger number of steps is not counted exactly.
 _MOST_STEPS = 2.0**53
 Gradient = Annotated[str, choice("composite", "mean-value")]
 
 
 @dataclass(frozen=True)
 class SoftWalls(base.Method):
-    """A method of fixed step with springs for walls, and nothing else. See the subclasses."""
+    """A method of fixed step with springs as walls. See the subclasses."""
 
     dt: Positive
     penalty: Positive
@@ -56,7 +56,7 @@ class SoftWalls(base.Method):
         return asked
 
     def record(self, kind: type["SoftNumbers"], scene: Scene, factor: float, form: Any = None) -> "SoftNumbers":
-        """The numbers of this description, of a kind that divides such a factor by the mass."""
+        """Return the numbers of this description as a record `kind`, which divides `factor` by the mass."""
         longest = longest_step(scene, self.dt)
         return kind(
             self.dt,
@@ -77,7 +77,7 @@ class SoftWalls(base.Method):
         return whole_time(moment, self.dt)
 
     def birth_times(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        # Steps begin and end together for all.
+        # All steps begin and end together.
         return np.ceil(times / self.dt - _WHOLE) * self.dt
 
     def parts(self, durations: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -98,7 +98,7 @@ class SoftWalls(base.Method):
 
 
 def check_gradient(method: Any) -> None:
-    """Raise a `SceneError` if a method of this exponent has no such gradient."""
+    """Raise a `SceneError` if the method has no such gradient for its exponent."""
     if method.gradient == "mean-value" and method.exponent == 1.0:
         raise SceneError(
             'gradient must be "composite" for exponent = 1, got "mean-value": that form is the gradient of Phi at a '
@@ -107,18 +107,18 @@ def check_gradient(method: Any) -> None:
 
 
 def moves(scene: Scene) -> Moves | None:
-    """`Moves` as kernels take it, where a wall moves."""
+    """Return `Moves` in the form for kernels, or None if no wall moves."""
     return Moves(0.0) if scene.moves() else None
 
 
 def laws_at_ends(scene: Scene, apart: str = "fixed steps") -> Laws | None:
-    """The laws of walls as kernels take them, where a wall has any besides its motion."""
+    """Return the laws of walls in the form for kernels, or None if no wall has laws besides its motion."""
     laws = scene.compiled(apart=apart).laws
     return laws if laws is not None and (laws.loses or laws.send_off) else None
 
 
 def check_instants(scene: Scene, dt: float) -> None:
-    """Raise a `SceneError` where walls come or go, or openings open or shut, within a step."""
+    """Raise a `SceneError` if walls come or go, or openings open or shut, within a step."""
     for time in scene.instants:
         if abs(time / dt - round(time / dt)) > _WHOLE:
             raise SceneError(
@@ -128,9 +128,9 @@ def check_instants(scene: Scene, dt: float) -> None:
 
 
 def check_turns(method: base.Method, scene: Scene) -> None:
-    """Raise a `SceneError` where a wall that turns does not give what its steps are made of."""
+    """Raise a `SceneError` if a wall that turns lacks a function that its steps need."""
     purpose = f"{type(method).__name__} at a wall that turns"
-    # Of the walls that steps take: a union of several rooms is one, and a sphere about its own centre does not turn.
+    # For the walls of steps: a union of several rooms is one wall, and a sphere about its own centre does not turn.
     pieces = scene.compiled(apart="fixed steps").pieces
     for i, piece in zip(pieces.owners, pieces.each, strict=True):
         if piece.motion is not None and drive_of(piece, 0.0).turn is not None:
@@ -138,7 +138,7 @@ def check_turns(method: base.Method, scene: Scene) -> None:
 
 
 def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
-    """Raise a `SceneError` where the fastest particle can jump over a solid in one step, or a solid over it."""
+    """Raise a `SceneError` if the fastest particle can jump over a solid in one step, or a solid over the particle."""
     balls, fastest = particles.radius is not None, particles.fastest()
     if not balls:
         check_reach("dt", dt, scene, fastest)
@@ -156,7 +156,7 @@ def check_solids(scene: Scene, particles: Particles, dt: float) -> None:
 
 
 def check_reach(name: str, step: float, scene: Scene, fastest: float) -> None:
-    """Raise a `SceneError` where the fastest particle [m/s] may go farther over a face in a step than walls are."""
+    """Raise a `SceneError` if the fastest particle [m/s] can go beyond the known walls in a step over a face."""
     reach = scene.reach_of_steps()
     if reach is not None and fastest * step > reach:
         raise SceneError(
@@ -167,7 +167,7 @@ def check_reach(name: str, step: float, scene: Scene, fastest: float) -> None:
 
 
 def longest_step(scene: Scene, dt: float, balls: bool = False) -> float | None:
-    """The longest flight of points, or of balls, in a step that jumps over no solid [m]; None without solids."""
+    """Return the longest flight of points, or of balls, in a step that jumps over no solid [m]; None without solids."""
     if not any(surface.is_solid() for surface in scene.surfaces):
         return None
     thickness, i = thinnest(scene, dt, balls)
@@ -176,26 +176,27 @@ def longest_step(scene: Scene, dt: float, balls: bool = False) -> float | None:
 
 
 def way_of_walls(scene: Scene, dt: float) -> float:
-    """How far a wall moves by itself in a step, at most, as balls meet it [m]; turns are not counted."""
+    """Return the most that a wall moves in a step, as balls meet it [m], without turns."""
     return dt * max((_pace(surface, balls=True) for surface in scene.surfaces), default=0.0)
 
 
 def _half_widths(scene: Scene) -> tuple[float, ...] | None:
-    """The half width of the solid of each wall [m], infinite for a cavity; None if no wall has another side."""
+    """Return the half width of the solid of each wall [m], infinite for a cavity; None if no wall has another side."""
     if not any(surface.may_be_passed() for surface in scene.surfaces):
         return None
     return tuple(surface.size() if surface.is_solid() else math.inf for surface in _of_rows(scene))
 
 
 def _of_rows(scene: Scene) -> list[Surface]:
-    """The surface of each row, where each solid is a wall by itself."""
+    """Return the surface of each row, with each solid as a wall by itself."""
     return [scene.surfaces[i] for i in scene.compiled(apart="fixed steps").numbering.surfaces_of_rows]
 
 
 def _pace(surface: Surface, balls: bool = False) -> float:
-    """A bound of the speed with which a surface moves [m/s].
+    """Return a bound of the speed of a surface [m/s].
 
-    Of balls without what turns, which their lists follow, and 0 where impacts move it: their moves count against it.
+    For balls it excludes turns, which the lists of balls follow, and is 0 if impacts move the surface: then the motion
+    counts in the speed of the balls against it.
     """
     if surface.motion is None or (balls and surface.reacts()):
         return 0.0
@@ -208,7 +209,7 @@ def _pace(surface: Surface, balls: bool = False) -> float:
 
 
 def _speed_against(surface: Surface, particles: Particles) -> float:
-    """A bound of the speed of particles against a surface at the start [m/s]."""
+    """Return a bound of the speed of particles against a surface at the start [m/s]."""
     balls = particles.radius is not None
     if balls and surface.reacts():
         return particles.fastest(speed_at_start(surface.motion))
@@ -216,7 +217,7 @@ def _speed_against(surface: Surface, particles: Particles) -> float:
 
 
 def thinnest(scene: Scene, dt: float, balls: bool = False) -> tuple[float, int]:
-    """The thickness [m] and the number of the solid that is jumped over first."""
+    """Return the thickness [m] and the number of the solid that a step jumps over first."""
     solids = [(i, surface) for i, surface in enumerate(scene.surfaces) if surface.is_solid()]
     i, surface = min(solids, key=lambda one: (2.0 * one[1].size() - _pace(one[1], balls) * dt, one[0]))
     return 2.0 * surface.size(), i
@@ -227,7 +228,7 @@ def _described(scene: Scene, i: int) -> str:
 
 
 def whole_steps(name: str, duration: float, dt: float) -> float:
-    """The number of steps of a duration; a `SceneError` that calls it `name` where they are not whole."""
+    """Return the number of steps of a duration; raise a `SceneError` that calls it `name` if they are not whole."""
     if duration / dt > _MOST_STEPS:
         raise SceneError(
             f"{name} must be at most {_MOST_STEPS:g} steps, got {name} = {duration:g} s with dt = {dt:g} s"
@@ -242,7 +243,7 @@ def whole_steps(name: str, duration: float, dt: float) -> float:
 
 
 def _shortest(steps: int, dt: float) -> str:
-    """The time of so many steps in the fewest digits, six or more, that count as these.
+    """Return the time of `steps` steps in the fewest digits, six or more, that give this number of steps.
 
     >>> _shortest(27843, 2e-5), _shortest(12345678, 1e-3)
     ('0.55686', '12345.678')
@@ -252,7 +253,7 @@ def _shortest(steps: int, dt: float) -> str:
 
 
 def steps_within(duration: float, dt: float) -> float:
-    """The number of equal steps of a duration [s] that are no longer than dt [s], to round-off.
+    """Return the number of equal steps of a duration [s] that are no longer than dt [s], to round-off.
 
     >>> steps_within(0.3, 0.1), steps_within(0.31, 0.1), steps_within(1e-12, 0.1)
     (3.0, 4.0, 1.0)
@@ -261,24 +262,24 @@ def steps_within(duration: float, dt: float) -> float:
 
 
 def whole_time(moment: float, dt: float) -> float:
-    """The time of the steps until a moment [s], which they may miss a little: no wall must jump where frames meet."""
+    """Return the time of the steps at a moment [s], which they may miss: walls must not jump between frames."""
     return round(moment / dt) * dt
 
 
-# --- As kernels know it ----------------------------------------------------------------------------------
+# --- The form for kernels --------------------------------------------------------------------------------
 
 
 class StepEnergy(NamedTuple):
-    """The numbers that a lane keeps."""
+    """The numbers of a lane."""
 
-    twice_energy: float  # per mass, at the start, and with the work of walls since
-    over_mass: float  # the method's factor over the mass
+    twice_energy: float  # per mass, at the start plus the work of walls since then
+    over_mass: float  # the factor of the method over the mass
 
 
 class Steps(contract.MethodNumbers):
     """A method of steps, with the fields `dt`, `longest`, `factor` and `moving`: the walls of a step, and its ends."""
 
-    point = 1.0  # the part of a step after which it takes its force
+    point = 1.0  # the part of a step after which its force is taken
     contacts_take_time = True
 
     def seconds(self: Any, remaining):
@@ -303,50 +304,50 @@ class Steps(contract.MethodNumbers):
         return not self.lands
 
     def walls_of(self, walls, remaining):
-        # Of all walls: each part of a step asks for those that it needs.
+        # All walls: each part of a step selects those that it needs.
         return walls
 
     def at_start(self: Any, walls, remaining):
         return walls.at(remaining * self.dt)
 
     def over(self: Any, walls, remaining):
-        """The walls over that step."""
+        """Return the walls over the step."""
         return walls.during(remaining * self.dt, (remaining - 1.0) * self.dt)
 
     def after(self: Any, walls, remaining):
-        """The walls at the end of that step."""
+        """Return the walls at the end of the step."""
         return walls.at((remaining - 1.0) * self.dt)
 
     def times(self, walls, remaining):
-        """The walls at the start of that step, over it and at its end."""
+        """Return the walls at the start of the step, over it and at its end."""
         return self.at_start(walls, remaining), self.over(walls, remaining), self.after(walls, remaining)
 
     def reach(self: Any, before, gravity, lane):
-        """From r0 to the point of the force that it takes, as if there were no wall."""
+        """Return the displacement from r0 to the point at which the force is taken, without walls."""
         return displacement(gravity, lane.v, self.dt)
 
     def is_too_fast(self: Any, p):
-        """Whether a step with free displacement p could jump over a solid. Only its ends are looked at."""
+        """Whether a step with free displacement p could jump over a solid; only the length of p counts."""
         return False if self.longest is None else square(p) > self.longest * self.longest
 
     def work_along(self: Any, over, wall, force, ends):
-        """The work of a force of this wall in a step with these walls and ends, r0 and r1; 0 where no wall moves."""
+        """Return the work of a force of this wall in a step with the ends r0 and r1; 0 if no wall moves."""
         return 0.0 if self.moving is None else dot(force, over.swept(wall, *ends))
 
     def is_outside(self, walls, wall, r):
-        """Whether a point is outside of a wall: the contact of a step that ends there goes on in the next one."""
+        """Whether a point is outside of a wall: the contact of a step that ends there continues in the next one."""
         return walls.of(wall, False, _is_outside, r)
 
     def flight(self: Any, walls, gravity, lane, hit=None):
-        """Over the steps that surely stay free, to one that touches a wall: HARD where a lane cannot take it alone."""
+        """Fly over the steps that surely stay free, to one that touches a wall: HARD if a lane cannot take it alone."""
         dt, left = self.dt, lane.remaining * self.dt
         free = safe.free_time_moving(walls, gravity, lane.r, lane.v, left) if hit is None else hit.time
-        # One too many by round-off starts a contact 1e-16 deep: harmless.
+        # One step too many by round-off starts a contact 1e-16 deep, which is harmless.
         steps = np.floor(free * (1.0 / dt))
         return self.flown(walls, gravity, lane, select(steps < lane.remaining, steps, lane.remaining))
 
     def flown(self: Any, walls, gravity, lane, steps):
-        """The `FlightEnd` after so many free steps."""
+        """Return the `FlightEnd` after a number of free steps."""
         t = steps * self.dt
         start = contract.Lane(
             lane.r + displacement(gravity, lane.v, t), accelerated(gravity, lane.v, t), lane.remaining - steps,
@@ -359,27 +360,27 @@ class Steps(contract.MethodNumbers):
         dt = self.dt
         to_point = walls.during(lane.remaining * dt, (lane.remaining - self.point) * dt)
         touched = to_point.touched(lane.r, self.reach(self.at_start(walls, lane.remaining), gravity, lane))
-        # Several walls at once, or nested solves: the careful way.
+        # Several walls at once and nested solves need the careful way.
         alone = (touched.number <= 1.0) & (not isinstance(self.form, MeanValue))
         wall = select(alone, touched.wall, contract.HARD - touched.wall)
         return select(self.is_too_fast(displacement(gravity, lane.v, dt)), contract.HARD, wall)
 
 
 class SoftNumbers(Steps):
-    """A method with soft walls as kernels know it; each method has its own subclass."""
+    """A method with soft walls in the form for kernels; each method has its own subclass."""
 
     dt: float
     law: Any
-    longest: Any  # step that jumps over no solid, and out of a cell to known walls alone [m]; None without solids
-    factor: float  # of 1/mass in what a lane keeps
+    longest: Any  # longest step that jumps over no solid and out of a cell only to known walls [m]; None without solids
+    factor: float  # of 1/mass in the numbers of a lane
     form: Any  # of the discrete gradient, or None
-    moving: Any  # None, or `Moves` where a wall moves
+    moving: Any  # `Moves` if a wall moves, else None
     half_widths: Any  # of the solid of each wall [m], infinite for a cavity; None if no wall has another side
     size: float  # of the scene [m]
-    ends: Any  # None, or the `Laws` of its walls, which act where a contact ends
+    ends: Any  # the `Laws` of its walls, which act where a contact ends, or None
 
     def passes(self, walls, lane, wall, r, v):
-        """Whether a step that ends so leads a lane through the middle of this wall."""
+        """Whether a step with the end r, v leads a lane through the middle of this wall."""
         if self.half_widths is None:
             return False
         before, over, after = self.times(walls, lane.remaining)
@@ -389,7 +390,7 @@ class SoftNumbers(Steps):
         return medial.passes((before, lane.r), (after, r), wall, way, self.dt * (lane.v - v), self.half_widths)
 
     def _passes_any(self, walls, lane, r, v):
-        """As `passes`, for any of the walls that the step is in contact with."""
+        """Whether a step leads a lane through the middle of any wall that it is in contact with."""
         if self.half_widths is None:
             return False
         before, _over, after = self.times(walls, lane.remaining)
@@ -401,7 +402,7 @@ class SoftNumbers(Steps):
         return found
 
     def careful_step(self, walls, gravity, lane, impulse, i):
-        """The `Careful` step of a lane. Adds impulses to impulse[wall, i], and works to the rows behind those."""
+        """Return the `Careful` step of a lane; add impulses to impulse[wall, i], and works to the rows behind them."""
         raise NotImplementedError
 
     @outlined
@@ -424,7 +425,7 @@ def _is_outside(surface, r):
 
 
 class Taken(NamedTuple):
-    """A step of a lane, which may be the solution or not, with the impulse and the work of the wall per mass."""
+    """A step of a lane, solved or not, with the impulse and the work of the wall per mass."""
 
     r: Vec
     v: Vec
@@ -435,7 +436,7 @@ class Taken(NamedTuple):
 
 
 def contact(lane, wall, taken):
-    """The `Contact` of a lane that takes its step, or leaves it to the careful way, or is at the end of its frame."""
+    """Return the `Contact` of a lane that takes its step, leaves it to the careful way, or has ended its frame."""
     touching = wall >= 0.0
     step = (lane.remaining > 0.0) & select(touching, taken.solved, wall > contract.HARD)
     work = select(step & touching, taken.work, 0.0)
@@ -453,7 +454,7 @@ def contact(lane, wall, taken):
 
 
 class Careful(NamedTuple):
-    """A step against any number of walls, and their work per mass."""
+    """A step against any number of walls, and the work of the walls per mass."""
 
     r: Vec
     v: Vec

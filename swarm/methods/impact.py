@@ -20,18 +20,18 @@ from ..scene import Scene
 from ..surfaces.time_of_impact import flights
 from . import base, contract
 
-# Of the sliding tolerance: round-off, and steps that no longer follow the wall.
+# Bounds of the sliding tolerance: round-off, and steps that no longer follow the wall.
 _FINEST, _COARSEST = 1e-13, 1e-3
-# Of what is slow, the impulse that is round-off of a particle at its wall: to count it would count by chance. Those of
-# particles that a wall lets go are 1e-16 to 1e-14 of the speed, what is slow 1e-4.
+# The impulse, relative to the slow speed, that is round-off at a wall: counting it would count by chance. Impulses on
+# particles that a wall lets go are 1e-16 to 1e-14 of the speed, the slow speed is 1e-4 of it.
 _NO_IMPACT = 1e-8
-# A particle gets nowhere in this part of a crossing.
+# A particle makes no progress in this fraction of a crossing.
 _INSTANT = 1e-9
 
 
 @dataclass(frozen=True)
 class Impact(base.Method):
-    """Exact flight to the impact instant, then the converged contact step, and on: the default method.
+    """Exact flight to the instant of impact, then the converged contact step, and so on: the default method.
 
     At the impact the particle is on the surface (State I), where the augmented Lagrangian scheme with g1 = 0 is
     a reflection about the discrete gradient D(r0, r1):  v1 = v0 - 2 (v0.n) n,  r1 = r0 + h (v0 + v1)/2.
@@ -39,36 +39,36 @@ class Impact(base.Method):
     Args:
         contact_step: length h of the contact step [s], >= 0 and at most the crossing time size/|v|. 0 is the exact
             elastic reflection; h > 0 slides along a chord of the surface, as the paper's scheme does.
-        shortest_flight: a particle that comes back to the same wall sooner than this [s] (grazing, chattering, resting)
+        shortest_flight: a particle that returns to the same wall sooner than this [s] (grazing, chattering, resting)
             slides along it instead. None: 1e-4 of its own crossing time. Every other flight is exact, however short, so
             that a wedge of 1e-4 rad takes its 31415 impacts.
-        sliding_tolerance: relative error of a crossing of a particle that slides, from 1e-13 to 1e-3. The number of
-            steps in a crossing follows from it: some 150 for 1e-9, and proportional to its power -1/4.
-        dt: the step of bodies [s], above 0, which is cut at impacts and frames; None for particles, which have none.
+        sliding_tolerance: relative error of a crossing by a sliding particle, from 1e-13 to 1e-3. The number of
+            steps in a crossing follows from it: about 150 for 1e-9, and proportional to its power -1/4.
+        dt: the step of bodies [s], above 0, which is cut at impacts and frames; None for particles.
         order: the order of the steps of bodies between impacts: 2, or 4 by Suzuki's composition of five steps.
         contact_start: where the contact step begins. "impact": at the impact, as in the paper. "centred": h/2 before
             it; contact_step must be above 0 then.
 
-    A centred step takes the particle from r* - (h/2) v0 to r* + (h/2) v1, with r* where it meets the wall, and v1 is
+    A centred step takes the particle from r* - (h/2) v0 to r* + (h/2) v1, where r* is its place on the wall, and v1 is
     the same reflection about D(r0, r1) of these two ends. As n.(r1 - r0) = 0, it ends at the gap at which it begins.
     It is the reflection at r* with the normal of a point (h/2) v0.n inside. So it is exact on planes, and without
     gravity on spheres and cylinders; of second order in h where |grad phi| is the same all over the wall (a distance:
-    torus, capsule); elsewhere of first order, with an error some times smaller than that of a step from the wall. It
+    torus, capsule); elsewhere of first order, with an error several times smaller than that of a step from the wall. It
     begins at the earliest where the frame begins or the contact before ends, and ends at the latest with the frame;
-    then both of its halves are as much shorter. A step from r* with a wall in its way is replaced by the exact
-    reflection; so is one along a face of a mesh, a side of an outline or a wall of a room that ends beyond that.
+    both of its halves are then shorter by the same time. A step from r* with a wall in its way is replaced by the exact
+    reflection; so is one along a face of a mesh, a side of an outline or a wall of a room that ends beyond it.
 
     A particle slides along one wall, or the edge of two, by the contact step of the scheme in Suzuki's composition of
-    fourth order. It leaves a wall where that no longer presses on it, or where it meets another one. Chattering
+    fourth order. It leaves a wall when the wall no longer presses on it, or when it meets another wall. Chattering
     (restitution e < 1) ends after the sum of its geometric series. At rest, or inside the friction cone, it costs
-    nothing. A corner of three walls that move carries it in steps of their motion. An impulse of less than 1e-12 of the
+    nothing. A corner of three moving walls carries it in steps of their motion. An impulse of less than 1e-12 of the
     speed is no impact.
 
-    Particles with a radius meet at instants too, and neither slide nor rest. Where a contact would last they bounce, so
-    high that a flight from a wall back to it takes t_c (`contact_duration` of `Pairs`; without losses some 1e-7 of a
-    crossing). A ball that has met another one in the last t_c loses no energy. The energy that such a bounce gives,
+    Particles with a radius also meet at instants, and do not slide or rest. Where a contact would last they bounce, so
+    high that a flight from a wall back to it takes t_c (`contact_duration` of `Pairs`; without losses about 1e-7 of a
+    crossing). A ball that has met another ball in the last t_c loses no energy. The energy that such a bounce gives,
     m (a t_c)^2/8 with the acceleration a back to the wall, is a negative part of the dissipated energy, and the next
-    impact takes it. So a lasting contact costs at least an impact in t_c: for grains that rest on each other for long
+    impact takes it. So a lasting contact costs at least one impact in t_c: for grains that rest on each other for long
     use `Penalty`. Walls may move, have a mass, come and go, be open or hot, or have laws. A ball leaves where its point
     of contact is in an opening.
 
@@ -76,10 +76,10 @@ class Impact(base.Method):
         SceneError: an argument is out of its range.
 
     Conserves: the energy, to round-off that does not grow, since the energy of each particle is kept; no particle is
-    outside by more than round-off. With restitution, friction and thermal walls it conserves the energy plus what was
-    dissipated less the heat of the walls.
+    outside by more than round-off. With restitution, friction and thermal walls it conserves the energy plus the
+    dissipated energy minus the heat of the walls.
     Order: exact for contact_step = 0, otherwise first order in h at an impact (`python -m bench order`); sliding is of
-    fourth order, and where three walls or a cusp hold a particle of second, without friction.
+    fourth order, and of second order, without friction, where three walls or a cusp hold a particle.
     Cost: one square root and one division for a flight in a sphere; `python -m bench throughput`, `bench contacts`.
     Source: García Orden & Ortega 2007, eqs. (7), (8) in the limit V -> 0; Suzuki, Phys. Lett. A 146 (1990) 319.
 
@@ -131,7 +131,7 @@ class Impact(base.Method):
         return None
 
     def time_of_impact(self) -> float:
-        # A centred step is a part of the flights before and after it.
+        # A centred step replaces a part of the flights before and after it.
         return 0.0 if self.contact_start == "centred" else self.contact_step
 
     def is_rigid(self) -> bool:
@@ -145,14 +145,14 @@ class Impact(base.Method):
 
 
 def _bend(scene: Scene) -> float:
-    """The least length on which walls bend, or the size of one that moves [m]; infinite where all are flat and rest."""
+    """Return the least length on which walls bend, or the size of a moving wall [m]; infinite for flat walls."""
     bent = [one for one in scene.surfaces if one.motion is not None or not all(wall.flat for wall in one.walls())]
     sizes = [surface.size() for surface in bent]
     least = min(sizes, default=math.inf)
     return least if math.isfinite(least) or not sizes else scene.finite_size()
 
 
-# --- As kernels know it ----------------------------------------------------------------------------------
+# --- The form for kernels --------------------------------------------------------------------------------
 
 
 class ContactEnergy(NamedTuple):
@@ -163,7 +163,7 @@ class ContactEnergy(NamedTuple):
 
 
 class Reflection(contract.MethodNumbers):
-    """The method with the exact reflection. One of the shortest flight's two numbers is 0."""
+    """The method with the exact reflection. One of the two numbers of the shortest flight is 0."""
 
     size: float  # of the scene [m]
     bend: float  # the least length on which walls bend [m], infinite where all are flat
@@ -174,11 +174,11 @@ class Reflection(contract.MethodNumbers):
     laws: Laws
     contact_step: Any  # h of a chord [s], or None
 
-    # --- What a lane keeps ---
+    # --- The numbers of a lane ---
 
     def constants(self, mass, energy, scale2):
-        # Twice the energy per mass, 1/(2 |v|^2) where that is constant, and the speed of this particle that is slow:
-        # not by its velocity at the start of the frame: no contact may depend on where frames end
+        # Twice the energy per mass, 1/(2 |v|^2) if it is constant, and the slow speed of this particle. This speed does
+        # not follow from the velocity at the start of the frame: no contact may depend on where frames end
         twice_energy = 2.0 * energy
         moving = twice_energy > 0.0
         half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)
@@ -228,21 +228,21 @@ class Reflection(contract.MethodNumbers):
         )
 
     def speed2_of(self, gravity, lane):
-        """|v|^2 with which a lane comes."""
+        """Return |v|^2 with which a lane arrives."""
         if gravity is not None:
             return square(lane.v)
-        # As the energy says it, which round-off may leave below 0.
+        # From the energy, which round-off may leave below 0.
         speed2 = lane.own.energy.twice
         return select(speed2 > 0.0, speed2, 0.0)
 
     def is_within(self, lane, speed2, speed, part):
-        """Whether a speed is at most this part of twice the speed away from a wall below which a contact may last.
+        """Whether a speed is at most `part` of twice the speed away from a wall below which a contact may last.
 
         A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it; `slow` is twice that speed.
         """
         if not self.laws.change_energy:
             return speed <= part * lane.own.slow
-        # By the |v|^2 with which it comes: such walls change that. One of both is 0.
+        # From the |v|^2 on arrival, as such walls change it. One of by_time and by_length is 0.
         speed2, by_time, by_length = speed2 + self.fall2, self.shortest_flight, self.shortest_length
         part_of_size = 1.0 / (self.size * self.size)
         slow2 = speed2 * (by_time * by_time * part_of_size * speed2 + by_length * by_length * part_of_size)
@@ -250,20 +250,20 @@ class Reflection(contract.MethodNumbers):
 
 
 class Chord(Reflection):
-    """The method with a contact step, a chord of the surface; such scenes have no laws."""
+    """The method with a contact step, a chord of the surface, for scenes without laws."""
 
     looks_around = True
 
     def step(self, lane):
-        """The length of the contact step, which the end of the frame cuts."""
+        """Return the length of the contact step, which the end of the frame cuts."""
         return select(self.contact_step < lane.remaining, self.contact_step, lane.remaining)
 
     def start(self, gravity, lane):
-        """The start r0 of the step."""
+        """Return the start r0 of the step."""
         return lane.r
 
     def way(self, gravity, lane):
-        """Its free displacement p."""
+        """Return its free displacement p."""
         return displacement(gravity, lane.v, self.step(lane))
 
     # --- The unknown of a contact ---
@@ -291,7 +291,7 @@ class Chord(Reflection):
         return self.ended(lane, wall, solution, (r, v, h), stays)
 
     def ended(self, lane, wall, solution, end, stays):
-        """The `Contact` of a lane that takes its step to this end, (r1, v1, its time), if it stays inside, or waits."""
+        """Return the `Contact` of a lane that takes its step to `end`, (r1, v1, time), if it stays inside, or waits."""
         (r, v, h), impulse, hit = end, solution.turned.impulse, wall >= 0.0
         step = hit & stays & (impulse > lane.own.slow) & (not solution.unsolved)
         return contract.Contact(
@@ -307,12 +307,12 @@ class Chord(Reflection):
 
 
 class Centred(Chord):
-    """The method with a contact step that has its middle at the impact; the lane is there, on the wall."""
+    """The method with a contact step that has its middle at the impact, where the lane is, on the wall."""
 
     asks_flown = True
 
     def half(self, lane):
-        """Half the length of the contact step, which the flight before it and the end of the frame cut."""
+        """Return half the length of the contact step, which the flight before it and the end of the frame cut."""
         return base.centred_half(self.contact_step, lane)
 
     def step(self, lane):

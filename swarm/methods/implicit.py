@@ -1,7 +1,7 @@
-"""Midpoint and Trapezoidal: implicit steps with soft walls, which do not conserve the energy: baselines for the charts.
+"""Midpoint and Trapezoidal: implicit steps with soft walls, which do not conserve the energy: baselines for charts.
 
-A rule takes the force at a point that it has to find: it says where that point would be without walls (`reach`), and
-the step that follows from where it is (`end`). The point r is pushed by the force at itself: s = r - c V'(g(s)) grad
+A rule takes the force at an unknown point: it gives this point without walls (`reach`), and the end of
+the step from the point (`end`). The force at the point moves it from r to s: s = r - c V'(g(s)) grad
 g(s). With kappa = c V'(g(s)) g'(q(s)) it is s = r - kappa grad q(s), which the surface solves for s (`resolve`), so
 that one equation in one unknown is left:
     F(kappa) = kappa - c V'(g) g'(q) = 0 at s(kappa).                                        (I)
@@ -27,11 +27,11 @@ from ..kernel.vector import ZERO, Vec, norm, square
 from ..scene import Scene
 from . import contract, fixed_step
 
-# The derivative of F is a difference quotient over this part of kappa: right to about the same part, so that a step of
-# _TOLERANCE is the last.
+# The derivative of F is a difference quotient over this part of kappa, and correct to about the same part, so that a
+# step of _TOLERANCE is the last.
 _NUDGE = 1e-7
 _TOLERANCE = 1e-8
-# Sweeps of the vectorised solve; what needs more is solved by `reaction`.
+# Sweeps of the vectorised solve; lanes that need more are solved by `reaction`.
 _SWEEPS = 10
 _CAREFUL_ITERATIONS = 200
 
@@ -45,7 +45,7 @@ def _residual(law, surface, r, c, kappa):
 
 
 def _guess(surface, law, r, c):
-    """kappa if the wall were flat and the spring linear."""
+    """Return kappa for a flat wall and a linear spring."""
     q = surface.inner(r)
     g = surface.gap_of(q)
     slope, _curvature = surface.gap_slope(q, q)
@@ -55,7 +55,7 @@ def _guess(surface, law, r, c):
 
 
 def _improve(surface, law, r, c, kappa):
-    """The Newton step of kappa, and whether it was so large that another is needed."""
+    """Return the Newton step of kappa, and whether it is so large that another is needed."""
     f = _residual(law, surface, r, c, kappa)
     nudge = _NUDGE * kappa
     rise = _residual(law, surface, r, c, kappa + nudge) - f
@@ -67,7 +67,7 @@ def _improve(surface, law, r, c, kappa):
 
 
 def _reached(walls, wall, r, kappa):
-    """s; r where there is no such wall."""
+    """Return s, or r without such a wall."""
     end = r
     for k, one in reversed(tuple(enumerate(walls.each))):
         end = select(wall == k, one.resolve(r, kappa), end)
@@ -75,17 +75,17 @@ def _reached(walls, wall, r, kappa):
 
 
 class _AtEnd(NamedTuple):
-    """A form of `reaction`: the force is that at the end of the displacement, and c = h^2/(4m)."""
+    """A form of `reaction`: the force at the end of the displacement, with c = h^2/(4m)."""
 
     def reaction(self, law, multiplier, surface, step):
-        """`Reaction` of a surface."""
+        """Return the `Reaction` of a surface."""
         # A cavity pushes with kappa > 0, a solid with kappa < 0. The force falls along the push: F changes sign by
         # -F(0).
         r, c = step.r + step.p, step.c
         f_low = _residual(law, surface, r, c, 0.0)
         if f_low == 0.0:
             return Reaction(ZERO, 0.0, True)
-        # Before the pole of `resolve`.
+        # The root is before the pole of `resolve`.
         farthest = 0.5 * abs(surface.farthest_push())
         low, high = 0.0, math.copysign(min(abs(f_low), (1.0 - 1e-12) * farthest), -f_low)
         f_high = _residual(law, surface, r, c, high)
@@ -102,7 +102,7 @@ class _AtEnd(NamedTuple):
 
 
 class RuleStep(NamedTuple):
-    """r1, v1 and the change of the velocity that the walls take."""
+    """r1, v1 and the change of the velocity by the walls."""
 
     r: Vec
     v: Vec
@@ -110,22 +110,22 @@ class RuleStep(NamedTuple):
 
 
 class RuleNumbers(fixed_step.SoftNumbers):
-    """An implicit rule as kernels know it: the part of a step at its point, `reach`, and these two."""
+    """An implicit rule in the form for kernels: the part of a step at its point, `reach`, and the methods below."""
 
     def end(self, before, gravity, lane, s, push):
-        """The `RuleStep`, from the point s and `push`, kappa grad q(s), with the walls at its start."""
+        """Return the `RuleStep` from the point s and `push`, kappa grad q(s), with the walls at its start."""
         raise NotImplementedError
 
     def add_impulses(self, walls, lane, reactions, impulse, i):
-        """Add the impulse per mass of each wall to impulse[wall, i], its work to the rows behind: their sum."""
+        """Add the impulse per mass of each wall to impulse[wall, i], its work to the rows behind; return all work."""
         raise NotImplementedError
 
     def free(self, walls, gravity, lane):
-        """The point, as if it felt no force."""
+        """Return the point without forces at it."""
         return lane.r + self.reach(self.at_start(walls, lane.remaining), gravity, lane)
 
     def there(self, walls, lane):
-        """The walls when the particle is at the point."""
+        """Return the walls when the particle is at the point."""
         return walls.at((lane.remaining - self.point) * self.dt)
 
     def most_sweeps(self, walls):
@@ -149,13 +149,13 @@ class RuleNumbers(fixed_step.SoftNumbers):
         point = _reached(there, wall, r, solution.kappa)
         step = self.end(before, gravity, lane, point, r - point)
         touching = wall >= 0.0
-        # Another wall at s, or an equation that is not solved yet: the careful way.
+        # Another wall at s or an unsolved equation needs the careful way.
         solved = (not solution.unsolved) & (not there.outside(wall, point))
         solved = solved & (not self.passes(walls, lane, wall, step.r, step.v))
         # The midpoint rule may end outside before it feels a force.
         inside = not before.outside(-1.0, lane.r)
         new = inside & (touching | after.outside(-1.0, step.r))
-        # One wall alone has a part in the kick.
+        # One wall alone contributes to the kick.
         work = self.work_along(over, wall, -1.0 / self.dt * step.kick, (lane.r, step.r))
         taken = fixed_step.Taken(step.r, step.v, solved, select(touching, norm(step.kick), 0.0), new, work)
         return fixed_step.contact(lane, wall, taken)
@@ -215,11 +215,11 @@ class TrapezoidalNumbers(RuleNumbers):
         return work + corner.add_reaction_works(moving, over, -2.0 / (h * h), reactions, (lane.r, lane.r), impulse, i)
 
 
-# --- As users describe them ------------------------------------------------------------------------------
+# --- The description for users ---------------------------------------------------------------------------
 
 
 class ImplicitRule(fixed_step.SoftWalls):
-    """A method of such a rule."""
+    """A method with an implicit rule."""
 
     rule: ClassVar[type[RuleNumbers]]
 
@@ -246,7 +246,7 @@ class Midpoint(ImplicitRule):
         SceneError: an argument is out of its range; a frame time is not a whole number of steps.
 
     Conserves: quadratic invariants only, so the energy of a linear spring that never lets go, but not that of a contact
-    that begins and ends: each changes the energy by what the force at the middle of a step misses. No stability limit.
+    that begins and ends: each changes the energy by the error of the force at the middle of a step. No stability limit.
     Order: 2 in dt. Cost: free steps, which it takes exactly, are jumped over in one evaluation; a
     contact step solves one scalar equation.
     Walls may move without turning: the force is that of the walls at the middle of the step.

@@ -33,8 +33,8 @@ class Penalty(fixed_step.SoftWalls):
         exponent: a >= 1 of the regularisation: 1 a linear spring, 1.5 Hertz's law.
         gradient: "composite", or "mean-value", which is the paper's general form, slow, and needs exponent > 1.
         friction_tolerance: of grains, from 1e-10 to 1: the change by which a sweep over all contacts ends the
-            solution of a step for friction, relative to what moves at a contact. In 20 steps places in a pile are
-            exact to 5e-5 of a radius with 0.02, and to 1e-10 with 1e-8. A few grains are exact with any.
+            solution of a step for friction, relative to the momentum at a contact. In 20 steps places in a pile are
+            exact to 5e-5 of a radius with 0.02, and to 1e-10 with 1e-8. A few grains are exact with any value.
 
     Raises:
         SceneError: an argument is out of its range; a frame time is not a whole number of steps.
@@ -45,31 +45,31 @@ class Penalty(fixed_step.SoftWalls):
     through the edge of a solid that is shorter than |v| dt. A particle that gets through the middle of a solid ends
     the run with an error, which names a penalty that holds it.
 
-    Walls that move: the step is that of the frame of each wall. A contact with one that turns costs two to three times
-    one at rest. Where walls move in any way but uniformly, free steps may be jumped over in several parts.
+    Moving walls: the step is that in the frame of each wall. A contact with a wall that turns costs two to three times
+    one at rest. If walls do not move uniformly, free steps may be jumped over in several parts.
 
-    Cells that repeat: a particle that leaves the cell comes back at the end of its step. Among solids that have images
+    Periodic cells: a particle that leaves the cell comes back at the end of its step. Among solids that have images
     a step may go a twentieth of the shortest period.
 
-    Laws of walls: `restitution`, `friction`, `temperature` and `laws` act on points where a contact ends. They make of
-    it what they make of an impact on a rigid wall, and what they take or give is booked. In an edge they act on no more
-    speed than their wall has given, and what other walls have given besides stays. Friction acts on the whole impulse
+    Laws of walls: `restitution`, `friction`, `temperature` and `laws` act on points where a contact ends. They change
+    the velocity as at an impact on a rigid wall, and the energy that they take or give is booked. In an edge they act
+    only on the speed that their wall has given; the speed from other walls stays. Friction acts on the whole impulse
     of a contact; in a contact that gravity makes last it acts each time that the particle swings back.
 
     Openings: a step decides at its start whether the wall is open at the foot of the point on it. Doors are at whole
-    steps. What a contact stores with a wall that opens, or goes, is in "dissipated_energy"; so is what walls store of a
-    particle that another wall absorbs.
+    steps. The energy that a contact stores in a wall that opens or goes is in "dissipated_energy"; so is the energy
+    that walls store of a particle that another wall absorbs.
 
     Unions and foams: a `Union` of several rooms, or a foam, is one wall with the same laws for all of its parts. In a
-    doorway nothing pushes, and behind the edge of one the nearer room does. A step that is longer than the wall
+    doorway no wall pushes, and behind its edge the nearer room pushes. A step that is longer than the wall
     between two rooms is thick may pass it without a contact.
 
     Bodies: links stay rigid, and walls are springs for the contact points, each alone or in cavities.
 
     Particles with a radius (grains) press on one another and on walls by the same law, with the gap
     R_i + R_j - |r_i - r_j|. All impulses of a step are solved together. `restitution` (0.01 or more) and `friction`
-    are those of `Pairs` and of surfaces; what is lost is in "dissipated_energy". A damper that never pulls gives the
-    restitution asked for at any speed. Friction sticks where it can, so that a pile comes to rest and stays so. It
+    are those of `Pairs` and of surfaces; the loss is in "dissipated_energy". A damper that never pulls gives the
+    required restitution at any speed. Friction sticks where it can, so that a pile comes to rest and stays at rest. It
     turns balls, with a moment of inertia of 2/5 m R^2, in a plane too. Balls that roll lose energy by `rolling` alone.
     `temperature` and `laws` of walls act on a ball where a contact ends, on the velocity that its dampers and its
     friction leave, mirrored; the ball keeps its spin. Walls may move in any way. The impulses of friction and rolling
@@ -85,11 +85,11 @@ class Penalty(fixed_step.SoftWalls):
 
     Grains meet fields, outlines and meshes too: each solid once, and each face once. A face is the
     triangles of a plane or of a convex body, or the sides that join smoothly or at an edge towards the balls. In a
-    corner around them they touch both faces. Within a contact's width of where the faces of one surface join, as on the
-    facets of a round hopper, they feel both, and are lifted by less than they overlap.
+    corner around them they touch both faces. Within a contact's width of the joint of two faces of one surface, as on
+    the facets of a round hopper, they feel both, and are lifted by less than they overlap.
 
-    Conserves: m v^2/2 - m G.r + alpha Phi^2/2 of each point, to round-off, at any dt; with walls that move the same
-    less the work of the walls. Of grains the energy, the momentum and the angular momentum of all, at any dt.
+    Conserves: m v^2/2 - m G.r + alpha Phi^2/2 of each point, to round-off, at any dt; with moving walls this energy
+    minus the work of the walls. For grains the energy, the momentum and the angular momentum of all, at any dt.
     Order: 2 in dt.
     Cost: free steps are jumped over in one evaluation; a contact step solves one scalar equation.
     Source: García Orden & Ortega 2007, eqs. (2)-(5), with the composite discrete gradient of surfaces/contract.py.
@@ -117,11 +117,11 @@ class Penalty(fixed_step.SoftWalls):
         return self.gradient == "composite" and super().seldom_hard(scene)
 
 
-# --- As kernels know it ----------------------------------------------------------------------------------
+# --- The form for kernels --------------------------------------------------------------------------------
 
 
 class ContactStep(NamedTuple):
-    """Length of the contact step, the same in the unit of `remaining`, and the regularisation."""
+    """Length of the contact step, this length in the unit of `remaining`, and the regularisation."""
 
     h: float
     used: float
@@ -131,7 +131,7 @@ class ContactStep(NamedTuple):
 class Pushed(NamedTuple):
     """The end of a contact step, its walls over the step and at its end, and the impulse and the work per mass.
 
-    `balanced` is whether its energy is that of the start and the work, up to round-off that is restored.
+    `balanced` is whether its energy is that of the start plus the work, up to round-off that is restored.
     """
 
     r: Vec
@@ -144,17 +144,17 @@ class Pushed(NamedTuple):
 
 
 class GradientSteps(fixed_step.Steps):
-    """The steps with a discrete gradient, r1 = r0 + p - kappa D(r0, r1); they have the fields `law` and `form` too."""
+    """The steps with a discrete gradient, r1 = r0 + p - kappa D(r0, r1); they also have the fields `law` and `form`."""
 
     # Whether multipliers add to the springs.
     multiplies = False
 
     def cut(self: Any, remaining):
-        """The `ContactStep` of the next contact step."""
+        """Return the `ContactStep` of the next contact step."""
         return ContactStep(self.dt, 1.0, self.law)
 
     def free(self: Any, gravity, lane, h):
-        """The step without walls: r0, p and c = h^2/(2m)."""
+        """Return the step without walls: r0, p and c = h^2/(2m)."""
         raise NotImplementedError
 
     def over_mass(self: Any, lane):
@@ -177,7 +177,7 @@ class GradientSteps(fixed_step.Steps):
         return select(solution.unsolved, kappa - newton.step, kappa), solution.unsolved & newton.more, newton.record
 
     def pushed(self, walls, gravity, lane, wall, h, kappa):
-        """The `Pushed` step of a wall, or the free one."""
+        """Return the `Pushed` step of a wall, or the free step."""
         over, step = self.over(walls, lane.remaining), self.free(gravity, lane, h)
         touching = wall >= 0.0
         r1 = select(touching, over.push(wall, step.r, step.p, kappa), step.r + step.p)
@@ -190,7 +190,7 @@ class GradientSteps(fixed_step.Steps):
         return end._replace(v=select(touching, end.v, v1))
 
     def reacted(self, walls, gravity, lane, h, end, reactions, impulse, i):
-        """The `Pushed` step with these reactions of all walls; adds their impulses and works to `impulse`."""
+        """Return the `Pushed` step with the reactions of all walls; add their impulses and works to `impulse`."""
         over, reaction = self.over(walls, lane.remaining), corner.total(reactions)
         corner.add_reaction_impulses(reactions, h, impulse, i)
         work = corner.add_reaction_works(self.moving, over, -2.0 / (h * h), reactions, (lane.r, end), impulse, i)
@@ -199,7 +199,7 @@ class GradientSteps(fixed_step.Steps):
         return self._restored(walls, gravity, lane, h, Pushed(end, v1, over, None, 0.0, work, False), force)
 
     def _restored(self: Any, walls, gravity, lane, h, end, force):
-        """A `Pushed` step with the energy of the start and the work; `force` is what multipliers may add."""
+        """Return a `Pushed` step with the energy of the start plus the work; `force` counts with multipliers only."""
         after = self.after(walls, lane.remaining)
         energy = 0.5 * lane.own.twice_energy + end.work
         budget = energies.Budget(self.over_mass(lane), energy, force if self.multiplies else 0.0)
@@ -209,7 +209,7 @@ class GradientSteps(fixed_step.Steps):
 
 
 class PenaltyNumbers(GradientSteps, fixed_step.SoftNumbers):
-    """The step with the composite discrete gradient, or with the mean-value one."""
+    """The step with the composite or the mean-value discrete gradient."""
 
     def free(self, gravity, lane, h):
         return Step(lane.r, displacement(gravity, lane.v, h), lane.own.over_mass)
@@ -220,7 +220,7 @@ class PenaltyNumbers(GradientSteps, fixed_step.SoftNumbers):
     def contact(self, walls, gravity, lane, wall, solution):
         # One step, free or in contact with one wall
         end = self.pushed(walls, gravity, lane, wall, self.dt, solution.kappa)
-        # A push into another wall, or an equation that is not solved yet: the careful way.
+        # A push into another wall or an unsolved equation needs the careful way.
         solved = end.balanced & (not solution.unsolved) & end.over.pushes(wall, solution.kappa)
         solved = solved & (not end.after.outside(wall, end.r)) & (not self.passes(walls, lane, wall, end.r, end.v))
         new = (wall >= 0.0) & (not end.over.outside(-1.0, lane.r))

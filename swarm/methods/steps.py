@@ -1,7 +1,7 @@
 """The steps of `AugmentedLagrangian`: of fixed length, or cut at the instant of impact, or centred about it.
 
-Each says how a flight ends, how long its contact step is, whether another wall has a part in it, and which
-exact impacts replace it.
+Each kind of step gives the end of a flight, the length of its contact step, whether another wall takes part in it,
+and the exact impacts that replace it.
 """
 
 import math
@@ -25,19 +25,19 @@ from ..surfaces.time_of_impact import flights
 from . import base, contract, penalty
 
 RAISE, COUNT, IMPACT = 0, 1, 2
-# A second wall nearer than this part of the shortest flight is met in the same instant.
+# A second wall nearer than this fraction of the shortest flight is met at the same instant.
 _SAME_INSTANT = 1e-6
 # Exact impacts within one step that replace a contact; a step of this many is stuck in a corner.
 _MOST_BOUNCES = 1000
-# A |v|^2 that is off its first value by more than this has lost energy to a tolerance, which is not to be hidden.
+# A |v|^2 that differs from its first value by more than this has lost energy to a tolerance, which must not be hidden.
 _ROUND_OFF = 1e-13
 
 
 class StepNumbers(penalty.GradientSteps):
-    """The method as kernels know it, and what is different between its two kinds of steps."""
+    """The method in the form for kernels, and the methods that differ between its kinds of steps."""
 
     multiplies = True
-    # Of 1/mass in what a lane keeps.
+    # Of 1/mass in the numbers of a lane.
     factor = 0.5
     dt: float
     law: Any
@@ -47,43 +47,43 @@ class StepNumbers(penalty.GradientSteps):
     max_sweeps: int
     acceleration: float
     policy: int
-    longest: Any  # step that jumps over no solid, and out of a cell to known walls alone [m]; None without solids
-    moving: Any  # None, or `Moves` where a wall moves, in fixed steps
-    ends: Any  # None, or the `Laws` of its walls, which act where a contact ends
+    longest: Any  # longest step that jumps over no solid and out of a cell only to known walls [m]; None without solids
+    moving: Any  # `Moves` if a wall moves, in fixed steps, else None
+    ends: Any  # the `Laws` of its walls, which act where a contact ends, or None
 
     @property
     def size(self):
-        """That of the scene [m]."""
+        """The size of the scene [m]."""
         return self.shortest_length / base.SHORTEST
 
     def is_alone(self, met, after, start, r1, kappa):
-        """Whether no other wall than the one that is `met` (walls, number) has a part in the step from `start` to r1.
+        """Whether only the wall that is `met` (walls, number) takes part in the step from `start` to r1.
 
-        `after` are those at its end, as it takes them. Then one lane can do the step alone.
+        `after` are the walls at the end of the step. Then one lane can do the step alone.
         """
         raise NotImplementedError
 
     def is_blocked(self, met, held, start, h):
-        """Whether the chord on the wall that is `met` meets another one later in the step, or passes a solid by.
+        """Whether the chord on the wall that is `met` meets another wall later in the step, or passes by a solid.
 
-        `held` are the walls and its number as the step takes them.
+        `held` are the walls and the number of the wall in the form that the step takes.
         """
         return False
 
     def start(self, lane):
-        """The lane at the start of its contact step."""
+        """Return the lane at the start of its contact step."""
         return lane
 
     def held(self, walls, start, wall):
-        """The walls, and the number of one, as taken by the step that has this lane at its start."""
+        """Return the walls, and the number of one, in the form that the step from the lane `start` takes."""
         return walls, wall
 
     def ended(self, lane, contact):
-        """The contact, with what remains of the frame of the lane."""
+        """Return the contact, with the time left of the frame of the lane."""
         return contact
 
     def as_impacts(self, walls, lane, cut, wall, lanes, i):
-        """The contact as exact impacts: the result of `hard_pass`."""
+        """Make the contact by exact impacts; return the result of `hard_pass`."""
         raise NotImplementedError
 
     # --- The unknown of a contact ---
@@ -130,7 +130,7 @@ class StepNumbers(penalty.GradientSteps):
         return self.ended(lane, self._step(walls, gravity, self.start(lane), wall, solution))
 
     def _step(self, walls, gravity, lane, wall, solution):
-        """The `Contact` of a lane at the start of its step."""
+        """Return the `Contact` of a lane at the start of its step."""
         cut, kappa = self.cut(lane.remaining), solution.kappa
         held, number = self.held(walls, lane, wall)
         end = self.pushed(held, gravity, lane, number, cut.h, kappa)
@@ -140,7 +140,7 @@ class StepNumbers(penalty.GradientSteps):
         step = (lane.remaining > 0.0) & touching & solved
         new = step & (not self.is_outside(end.over, wall, lane.r))
         work = select(step, end.work, 0.0)
-        # A step without contact: only fixed steps end here that way, just before one.
+        # A step without contact: only fixed steps end here without one, just before a contact.
         loose = (lane.remaining > 0.0) & (wall > contract.HARD) & (not touching)
         return contract.Contact(
             select(step | loose, end.r, kept(lane.r)),
@@ -184,14 +184,14 @@ class StepNumbers(penalty.GradientSteps):
 
 @outlined
 def _first_energy(lane):
-    """The energy at the start of the run, if it is that up to round-off, else that of now."""
+    """Return the energy at the start of the run if it is the present one up to round-off, else the present one."""
     now, first = square(lane.v), lane.own.twice_energy
     speed2 = first if abs(first - now) <= _ROUND_OFF * now else now
     return Energy(speed2, 0.5 / speed2)
 
 
 def _after(r, v, remaining, hits):
-    """The contact; its impulses were added one by one."""
+    """Return the contact; its impulses were added one by one."""
     return contract.Contact(r, v, remaining, 0.0, 0.0, hits, 0.0, False)
 
 
@@ -202,13 +202,13 @@ class FixedSteps(StepNumbers):
         return not after.outside(met[1], r1)
 
     def is_outside(self, walls, wall, r):
-        # From there the next step pushes it again, whether the loop of this one has converged or not.
+        # The next step pushes the particle again from there, whether or not the loop of this one has converged.
         return walls.of(wall, False, uzawa.is_outside, r)
 
     @outlined
     def as_impacts(self, walls, lane, cut, wall, lanes, i):
         if self.moving is not None:
-            # Refused before the run.
+            # The checks before the run refuse this case.
             return contract.refused(lane, Status.UNCONVERGED.value)
         energy, r, v = _first_energy(lane), lane.r, lane.v
         walls, remaining = self.at_start(walls, lane.remaining), cut.h
@@ -235,7 +235,7 @@ class CutSteps(StepNumbers):
         return remaining
 
     def cut(self, remaining):
-        # The loop's rate depends on alpha h^2, its fixed point does not: a step cut short by the frame gets a larger
+        # The rate of the loop depends on alpha h^2, its fixed point does not: a step that the frame cuts gets a larger
         # alpha.
         h = select(self.dt < remaining, self.dt, remaining)
         part = self.dt / h
@@ -246,7 +246,7 @@ class CutSteps(StepNumbers):
         return False
 
     def held(self, walls, start, wall):
-        # Of a field the member that is met: its row is the number of that. Of a union the room.
+        # In a field the member that is met, with its number as its row; in a union the room.
         if len(walls.fields()) == 0 and len(walls.unions) == 0:
             return walls, wall
         return as_met(walls, wall), select(wall < 0.0, wall, 1.0 * walls.row(wall))
@@ -264,7 +264,7 @@ class CutSteps(StepNumbers):
         kappa = chord(taken, number, r, p)
         r1 = taken.push(number, r, p, kappa)
         other = flights.other_hit(walls, wall, r, r1 - r, 1.0)
-        # Another wall that the particle is on as well takes part in the loop; one that is a little away is met later.
+        # Another wall that the particle is also on takes part in the loop; one that is a little away is met later.
         later = other.time <= 1.0 and not _is_held_by(walls, other.wall, self.law, r)
         later = later or not walls.keeps(wall, r1) or uzawa.meets_later(taken, number, self.law, r, p)
         return not taken.pushes(number, kappa) or kappa == 0.0 or later
@@ -293,12 +293,12 @@ class CutSteps(StepNumbers):
 
 
 class CentredSteps(CutSteps):
-    """Steps with their middle at the impact, where a lane is; in State I of the level that they begin on."""
+    """Steps with their middle at the impact, where the lane is, in State I of the level on which they begin."""
 
     asks_flown = True
 
     def half(self, lane):
-        """Half the length of the contact step."""
+        """Return half the length of the contact step."""
         return base.centred_half(self.dt, lane)
 
     def start(self, lane):
@@ -319,7 +319,7 @@ class CentredSteps(CutSteps):
 
     def guess(self, walls, gravity, lane, wall):
         kappa, touching = CutSteps.guess(self, walls, gravity, lane, wall)
-        # A step without length is for the exact impact.
+        # The exact impact replaces a step of zero length.
         there = touching & (self.half(lane) > 0.0)
         return select(there, kappa, 0.0), there
 
@@ -339,11 +339,11 @@ class CentredSteps(CutSteps):
 
 
 def _is_free(walls, start, r1):
-    """Whether no wall is between the impact, the middle of the step that starts there, and its end r1."""
+    """Whether no wall is between the impact, which is the middle of the step from `start`, and its end r1."""
     middle = start.r + 0.5 * start.remaining * start.v
     return flights.is_free(walls, middle, r1 - middle, 1.0)
 
 
 def _is_held_by(walls, wall, law, r):
-    """Whether a wall takes part in the loop of a step from r: a particle is on it, and it is no member of a field."""
+    """Whether a wall takes part in the loop of a step from r: the particle is on it, and it is no member of a field."""
     return wall >= walls.count_in_fields() and walls.of(wall, False, uzawa.has_limit, law, r)

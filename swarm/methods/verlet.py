@@ -49,11 +49,11 @@ class Verlet(fixed_step.SoftWalls):
         return self.record(VerletNumbers, scene, 0.5 * self.dt)
 
 
-# --- As kernels know it ----------------------------------------------------------------------------------
+# --- The form for kernels --------------------------------------------------------------------------------
 
 
 class VerletStep(NamedTuple):
-    """r1, v1, the change of the velocity by the walls, h (F0 + F1)/(2m), and their work per mass."""
+    """r1, v1, the change of the velocity by the walls, h (F0 + F1)/(2m), and the work of the walls per mass."""
 
     r: Vec
     v: Vec
@@ -62,10 +62,10 @@ class VerletStep(NamedTuple):
 
 
 class VerletNumbers(fixed_step.SoftNumbers):
-    """The rule."""
+    """The rule of the velocity Verlet step."""
 
     def step(self, walls, gravity, lane):
-        """The `VerletStep` of a lane."""
+        """Return the `VerletStep` of a lane."""
         h, over_mass = self.dt, lane.own.over_mass
         before, over, after = self.times(walls, lane.remaining)
         f0 = walls_force(before, self.law, lane.r)

@@ -1,6 +1,6 @@
-"""Motions that are given: how a point that is led, or a wall, moves in time.
+"""Given motions: how a point that is led, or a wall, moves in time.
 
-A led point has one form for all, so that one kernel serves every motion:
+All led points have one form, so that one kernel serves every motion:
     s(t) = start + velocity t + cosine (cos(rate t) - 1) + sine sin(rate t).
 """
 
@@ -17,18 +17,18 @@ from ..common.validated import Bounded, Number, PositiveMagnitude, Validated
 from ..errors import SceneError
 from ..state import Floats
 
-# The largest angle of a motion [rad], where float64 numbers are 1.2e-7 rad apart; of far larger ones a sine is chance.
+# The largest angle of a motion [rad], where float64 numbers are 1.2e-7 rad apart; the sine of larger ones is inexact.
 LARGEST_ANGLE = 1e9
 
 
 def vector_of(name: str, value: Vector) -> Vector:
-    """`value` as three numbers with finite squares."""
+    """Return `value` as three numbers with finite squares."""
     x, y, z = (checks.bounded(f"{name}[{i}]", part) for i, part in enumerate(checks.vector(name, value)))
     return x, y, z
 
 
 def axis_of(name: str, value: Vector) -> Vector:
-    """`value` as the direction of an axis."""
+    """Return `value` as the direction of an axis."""
     axis = vector_of(name, value)
     if not any(axis):
         raise SceneError(f"{name} must have a direction, got (0, 0, 0)")
@@ -45,9 +45,9 @@ class Led(NamedTuple):
     Attributes:
         start: (3,) its place at time 0 [m].
         velocity: (3,) of the steady part [m/s].
-        cosine: (3,) what cos(rate t) - 1 multiplies [m].
-        sine: (3,) what sin(rate t) multiplies [m].
-        rate: of the angle [rad/s].
+        cosine: (3,) the factor of cos(rate t) - 1 [m].
+        sine: (3,) the factor of sin(rate t) [m].
+        rate: the rate of the angle [rad/s].
     """
 
     start: Floats
@@ -57,7 +57,7 @@ class Led(NamedTuple):
     rate: float
 
     def position(self, time: ArrayLike) -> Floats:
-        """The place (3,) at a time [s], or the places (3, T) at T times."""
+        """Return the place (3,) at a time [s], or the places (3, T) at T times."""
         t = np.asarray(time, dtype=np.float64)
         start, velocity, cosine, sine = (part.reshape(3, *(1,) * t.ndim) for part in self[:4])
         half = np.sin(0.5 * self.rate * t)
@@ -65,15 +65,15 @@ class Led(NamedTuple):
         return np.asarray(start + velocity * t - cosine * (2.0 * half * half) + sine * np.sin(self.rate * t))
 
     def velocity_at(self, time: float) -> Floats:
-        """Its velocity (3,) at a time [s]."""
+        """Return its velocity (3,) at a time [s]."""
         angle = self.rate * time
         return self.velocity + self.rate * (self.sine * math.cos(angle) - self.cosine * math.sin(angle))
 
 
 class Given(Validated):
-    """A motion that is given; motions add up: `Translation(...) + Rotation(...)`."""
+    """A given motion; motions add up: `Translation(...) + Rotation(...)`."""
 
-    # How many of its kind a sum may have, and what there is for more.
+    # The most motions of its kind in a sum, and the advice for more.
     most: ClassVar[float] = math.inf
     instead: ClassVar[str] = ""
 
@@ -101,7 +101,7 @@ class Translation(Given):
     velocity: BoundedVector
 
     def harmonic(self, start: ArrayLike) -> Led:
-        """The path of a point that is at `start` (3,) [m] at time 0."""
+        """Return the path of a point that is at `start` (3,) [m] at time 0."""
         return Led(point_of(start), np.array(self.velocity), np.zeros(3), np.zeros(3), 0.0)
 
 
@@ -135,7 +135,7 @@ class Oscillation(Given):
             )
 
     def harmonic(self, start: ArrayLike) -> Led:
-        """The path of a point that is at `start` (3,) [m] at time 0."""
+        """Return the path of a point that is at `start` (3,) [m] at time 0."""
         amplitude = np.array(self.amplitude)
         # sin(a + phase) - sin(phase) = sin(phase) (cos a - 1) + cos(phase) sin a
         cosine, sine = amplitude * math.sin(self.phase), amplitude * math.cos(self.phase)
@@ -149,7 +149,7 @@ class Rotation(Given):
     Args:
         axis: three numbers, not all 0; its length does not matter. The rotation is right-handed about it.
         rate: from -1e100 to 1e100 [rad/s].
-        center: a point of the axis [m]; the origin where none is given.
+        center: a point of the axis [m]; the origin by default.
 
     Raises:
         SceneError: an argument is out of its range.
@@ -167,7 +167,7 @@ class Rotation(Given):
     instead: ClassVar[str] = "about one axis their rates add up to that of a single one"
 
     def harmonic(self, start: ArrayLike) -> Led:
-        """The path of a point that is at `start` (3,) [m] at time 0."""
+        """Return the path of a point that is at `start` (3,) [m] at time 0."""
         point, axis = point_of(start), unit_axis(self)
         arm = point - self.center
         radius = arm - (arm * axis).sum() * axis
@@ -179,11 +179,11 @@ class Sum(Given):
     """Several motions of a wall at once: displacements add up.
 
     Args:
-        parts: at least one motion, of which at most one is a rotation, at most one a path, and none a guide. The
+        parts: at least one motion: at most one rotation, at most one path, and no guide. The
             centre of a rotation moves with the displacements.
 
     Raises:
-        SceneError: no part, one that is no motion, two rotations, two paths, or a guide.
+        SceneError: no part, a part that is not a motion, two rotations, two paths, or a guide.
 
     >>> both = Translation((1.0, 0.0, 0.0)) + Rotation((0.0, 0.0, 1.0), rate=2.0, center=(0.0, 0.0, 0.0))
     >>> len(both.parts)
@@ -206,7 +206,7 @@ class Sum(Given):
 
 
 def parts_of(motion: Any) -> tuple[Any, ...]:
-    """The parts of a sum, or the motion itself; () for None."""
+    """Return the parts of a sum, or the motion itself; () for None."""
     if motion is None:
         return ()
     return motion.parts if isinstance(motion, Sum) else (motion,)
@@ -216,12 +216,12 @@ Motion = Translation | Oscillation | Rotation
 
 
 def led(motion: Motion | None, start: ArrayLike) -> Led:
-    """The path of a point that is at `start` (3,) [m] at time 0; without a motion it is fixed in space."""
+    """Return the path of a point that is at `start` (3,) [m] at time 0; without a motion it is fixed in space."""
     return Translation((0.0, 0.0, 0.0)).harmonic(start) if motion is None else motion.harmonic(start)
 
 
 def require_angles(name: str, motion: Any, until: float) -> None:
-    """Raise a `SceneError` where a motion, called `name`, turns so often until a time [s] that no angle is known."""
+    """Raise a `SceneError` if a motion, called `name`, turns by more than LARGEST_ANGLE until a time [s]."""
     for one in parts_of(motion):
         oscillates = isinstance(one, Oscillation)
         if not oscillates and not isinstance(one, Rotation):
@@ -237,12 +237,12 @@ def require_angles(name: str, motion: Any, until: float) -> None:
 
 
 def unit_axis(rotation: Any) -> Floats:
-    """The unit vector (3,) along its axis."""
-    # By the largest part first: the squares of small components are 0.
+    """Return the unit vector (3,) along the axis."""
+    # Divided by the largest part first: the squares of small components are 0.
     axis = np.array(rotation.axis) / np.abs(rotation.axis).max()
     return np.asarray(axis / np.sqrt((axis**2).sum()))
 
 
 def point_of(start: ArrayLike) -> Floats:
-    """A point as an array."""
+    """Return a point as an array."""
     return np.array(checks.vector("start", start))

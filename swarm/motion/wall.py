@@ -1,6 +1,6 @@
-"""Motions of walls: along a path, of several at once, along a guide; what a scene file says of them; and poses.
+"""Motions of walls: along a path, of several at once, along a guide; their tables in scene files; and poses.
 
-A wall that is given at rest as the points xi is at time t where
+A wall that is given at rest as the points xi is at time t at
     x(t) = c + d(t) + A(t) (xi - c),
 with the displacement d, and the rotation A about the centre c, both of one motion or of the sum of several.
 """
@@ -22,21 +22,21 @@ from ..errors import SceneError
 from ..state import Floats
 from .given import Axis, Given, Led, Oscillation, Rotation, Sum, Translation, parts_of, point_of, unit_axis, vector_of
 
-# A path of more times is shown without them.
+# A path with more times is shown without them.
 _FEW = 4
 
 
 @dataclass(frozen=True, repr=False)
 class Path(Given):
-    """Displacement along a cubic spline, which is C^2: of a wall, not of a point, and without a rotation.
+    """Displacement along a cubic spline, which is C^2, of a wall, not of a point, and without a rotation.
 
     Args:
         times: at least two, ascending [s].
-        positions: for each time three numbers, the displacement from where the wall is given [m].
+        positions: for each time three numbers, the displacement from the given place of the wall [m].
 
     The second derivative is 0 at both ends (the natural spline). The times must cover the run. Between two equal
-    positions that follow one another the wall is at rest. It comes to rest with a velocity and an acceleration of 0;
-    so the way from or to a rest is two cubics, each for half of the time, and that between two rests three.
+    consecutive positions the wall is at rest. It comes to rest with a velocity and an acceleration of 0;
+    so the way from or to a rest is two cubics, each for half of the time, and the way between two rests three.
 
     Raises:
         SceneError: an argument is out of its range.
@@ -72,14 +72,14 @@ class Path(Given):
             )
 
     def __repr__(self) -> str:
-        """The call that makes it; of many times their number and their ends, for sentences hold it."""
+        """Return the call that makes it; of many times only their number and ends, as messages contain it."""
         if len(self.times) > _FEW:
             return f"Path(<{len(self.times)} times from {self.times[0]:g} to {self.times[-1]:g} s>)"
         return f"Path(times={self.times}, positions={self.positions})"
 
     @functools.cached_property
     def knots(self) -> Floats:
-        """The times at which the cubics begin, and the end of the last: the given ones and those beside rests."""
+        """The times at which the cubics begin, and the end of the last: the given times and those beside rests."""
         return self._spline[0]
 
     @functools.cached_property
@@ -92,14 +92,14 @@ class Path(Given):
 
     @functools.cached_property
     def _spline(self) -> tuple[Floats, Floats, Floats]:
-        """The knots, and the positions and second derivatives (3, knots) there."""
+        """The knots, and the positions and second derivatives (3, knots) at them."""
         t, x = np.array(self.times), np.array(self.positions).T
         h, slope = np.diff(t), np.diff(x) / np.diff(t)
         is_rest = (np.diff(x) == 0.0).all(axis=0)
         rests = np.append(is_rest, False) | np.append(False, is_rest)
         begins, ends = rests[:-1] & ~is_rest, rests[1:] & ~is_rest  # of a way that begins, or ends, at a rest
-        # The way from a rest to t_k goes there with the speed 2 slope + h m_k/6, that of one cubic is
-        # slope + h (m_k-1 + 2 m_k)/6: the speed 0 at the rest is what the knot in its middle is for.
+        # The way from a rest to t_k arrives there with the speed 2 slope + h m_k/6, one cubic would with
+        # slope + h (m_k-1 + 2 m_k)/6: the knot in its middle gives the speed 0 at the rest.
         one = begins ^ ends
         steep, wide = np.where(one, 2.0, 1.0) * slope, np.where(one, 1.0, 2.0) * h
         bends = np.zeros_like(x)  # second derivatives at the knots
@@ -129,7 +129,7 @@ class Path(Given):
         return knots, places, bends
 
     def displacement(self, time: float) -> Floats:
-        """The displacement (3,) at a time [s]."""
+        """Return the displacement (3,) at a time [s]."""
         k = min(max(int(np.searchsorted(self.knots, time, "right")) - 1, 0), len(self.knots) - 2)
         s, (a, b, c, d) = time - self.knots[k], self.cubics[:, :, k]
         return np.asarray(a + s * (b + s * (c + s * d)))
@@ -137,12 +137,12 @@ class Path(Given):
 
 @dataclass(frozen=True)
 class Guide(Given):
-    """A straight guide, and a spring: how a wall with a mass may move. It starts where it is given.
+    """A straight guide with a spring, for a wall with a mass. The wall starts at its given place.
 
     Args:
         axis: three numbers, not all 0; its length does not matter.
         speed: along the axis at the start, from -1e100 to 1e100 [m/s].
-        stiffness: of a spring that is relaxed where the wall is given, from 0 to 1e100 [N/m]; 0: no spring.
+        stiffness: of a spring that is relaxed at the given place of the wall, from 0 to 1e100 [N/m]; 0: no spring.
 
     Gravity pulls the wall along the axis.
 
@@ -162,12 +162,12 @@ class Guide(Given):
     instead: ClassVar[str] = "impacts move the wall along it and nothing else does; give it alone"
 
     def harmonic(self, start: ArrayLike) -> Led:
-        """The path of a point of the wall without its motion along the guide: a point at rest."""
+        """Return the path of a point of the wall without its motion along the guide: a point at rest."""
         return Led(point_of(start), np.zeros(3), np.zeros(3), np.zeros(3), 0.0)
 
 
 def speed_at_start(motion: Any) -> Floats:
-    """The velocity (3,) with which a wall that has a mass and does not turn begins [m/s]."""
+    """Return the initial velocity (3,) of a wall that has a mass and does not turn [m/s]."""
     if isinstance(motion, Translation):
         return np.array(motion.velocity, np.float64)
     return motion.speed * unit_axis(motion) if isinstance(motion, Guide) else np.zeros(3)
@@ -175,7 +175,7 @@ def speed_at_start(motion: Any) -> Floats:
 
 @dataclass(frozen=True)
 class Placed(Given):
-    """A wall that stays where a run has moved it: what is given at xi is at position + orientation xi.
+    """A wall that stays where a run has moved it: a point given as xi is at position + orientation xi.
 
     Args:
         position: three numbers [m].
@@ -197,9 +197,9 @@ KINDS: dict[str, Any] = {
 
 
 def parts_of_wall(where: str, value: Any, within: tuple[Any, ...] = ()) -> "WallMotion | None":
-    """`value` as the motion of a wall: None, a motion, its table, or a list of several; errors say where it is.
+    """Return `value` as the motion of a wall: None, a motion, its table, or a list of several; `where` is for errors.
 
-    `within` are the lists that it is in.
+    `within` are the lists that contain it.
 
     Raises:
         SceneError: `value` is not one of these.
@@ -223,7 +223,7 @@ def parts_of_wall(where: str, value: Any, within: tuple[Any, ...] = ()) -> "Wall
 
 
 def _of_table(table: Mapping[str, Any], where: str) -> "WallMotion":
-    """The motion that a table describes."""
+    """Return the motion that a table describes."""
     if "kind" not in table:
         raise SceneError(f"{where}.kind: expected one of {checks.listed(KINDS)}, got nothing")
     kind = checks.one_of(f"{where}.kind", table["kind"], KINDS)
@@ -240,7 +240,7 @@ def _of_table(table: Mapping[str, Any], where: str) -> "WallMotion":
 
 
 def _times(value: ArrayLike) -> tuple[float, ...]:
-    """`value` as the times of a path."""
+    """Return `value` as the times of a path."""
     times = checks.array("times", value)
     if times.ndim != 1 or times.size < 2:
         came = times.size if times.ndim == 1 else f"an array of shape {times.shape}"
@@ -259,14 +259,14 @@ def require_freedom(motion: "WallMotion | None", mass: float | None, inertia: fl
     if mass is not None and inertia is None and not (motion is None or isinstance(motion, Translation | Guide)):
         raise SceneError(
             f"motion must be None, a Translation or a Guide where a mass is given, got {motion}; a wall on a spring is "
-            "a Guide with a stiffness, one that turns has an inertia"
+            "a Guide with a stiffness, a wall that turns has an inertia"
         )
     if inertia is not None and not isinstance(motion, Rotation):
         raise SceneError(f"motion must be a Rotation where an inertia is given, got {motion}")
 
 
 def table_of(motion: "WallMotion") -> Any:
-    """The table of a wall's motion, of a sum a list of tables."""
+    """Return the table of a wall's motion, for a sum a list of tables."""
     names = {cls: kind for kind, cls in KINDS.items()}
     tables = [{"kind": names[type(one)], **asdict(one)} for one in parts_of(motion)]
     return tables[0] if len(tables) == 1 else tables
@@ -284,26 +284,26 @@ class Pose(NamedTuple):
     quaternion: tuple[float, float, float, float]  # of the turn, (w, x, y, z)
 
     def position(self) -> Floats:
-        """The place (3,) of the origin of the frame in which the wall is given."""
+        """Return the place (3,) of the origin of the frame in which the wall is given."""
         return np.asarray(self.center + self.shift - product(self.turn, self.center))
 
     def placed(self, points: Floats) -> Floats:
-        """Points (3, N) of the wall as it is given, where they are now."""
+        """Return the present places of points (3, N) of the wall as it is given."""
         middle = self.center[:, None]
         return np.asarray(middle + self.shift[:, None] + product(self.turn, points - middle))
 
     def turned(self, vectors: Floats) -> Floats:
-        """Vectors (3, N) of the frame of the wall in the scene."""
+        """Return vectors (3, N) of the frame of the wall in the scene."""
         return product(self.turn, vectors)
 
     def given(self, points: Floats) -> Floats:
-        """Points (3, N) of the scene in the frame in which the wall is given."""
+        """Return points (3, N) of the scene in the frame in which the wall is given."""
         middle = self.center[:, None]
         return np.asarray(middle + product(self.turn.T, points - self.shift[:, None] - middle))
 
 
 def pose(motion: WallMotion | None, time: float) -> Pose:
-    """The pose of a wall with this motion at a time [s]."""
+    """Return the pose of a wall with this motion at a time [s]."""
     found, center, turn, quaternion = np.zeros(3), np.zeros(3), np.eye(3), (1.0, 0.0, 0.0, 0.0)
     for one in parts_of(motion):
         if isinstance(one, Placed):
@@ -320,7 +320,7 @@ def pose(motion: WallMotion | None, time: float) -> Pose:
 
 
 def _turned_by(rotation: Rotation, angle: float) -> Floats:
-    """The matrix (3, 3) of a rotation by an angle [rad]."""
+    """Return the matrix (3, 3) of a rotation by an angle [rad]."""
     # Rodrigues: cos a + (1 - cos a) k k^T + sin a [k], where 1 - cos a = 2 sin^2(a/2)
     k, half = unit_axis(rotation), math.sin(0.5 * angle)
     across = np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
@@ -329,6 +329,6 @@ def _turned_by(rotation: Rotation, angle: float) -> Floats:
 
 
 def product(matrix: Floats, other: ArrayLike) -> Floats:
-    """(3, 3) times (3,) or (3, n), rounded term by term: the last bit of BLAS depends on the processor."""
+    """Return (3, 3) times (3,) or (3, n), rounded term by term: the last bit of BLAS depends on the processor."""
     rows = np.asarray(other)
     return np.asarray(sum(np.multiply.outer(matrix[:, k], rows[k]) for k in range(3)))

@@ -1,1 +1,1 @@
-"""Places for balls among others and within walls."""
+"""Random places for balls among others and within walls."""

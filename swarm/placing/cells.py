@@ -1,7 +1,7 @@
-"""Balls in lists by cells, where each finds those that it overlaps, whatever sizes they have.
+"""Balls in lists by cells, where each finds those that it overlaps, for any sizes.
 
-Balls of one size up to twice that are in cells of one level, as wide as the largest of them. Those that are no larger
-than the smallest ball of a level find all that they overlap of it in the 27 cells around their own.
+Balls of one size up to twice that size are in cells of one level, as wide as the largest of them. A ball that is no
+larger than the smallest of a level finds all balls of the level that it overlaps in the 27 cells around its own.
 """
 
 import math
@@ -17,33 +17,33 @@ from ..kernel.jit import Array, kernel, outlined, select
 from ..kernel.vector import Vec, column, put
 from ..state import Floats
 
-# So few places are looked at in plain Python, before a compiler is done.
+# Up to this number of places are tested in plain Python, before a compiler would be done.
 _FEW = 300
 
 
 class CellLists(NamedTuple):
     """The lists: balls enter them in the order of their sizes, from the largest on."""
 
-    position: Array  # (3, N) of those that have entered
+    position: Array  # (3, N) positions of the balls that have entered
     radius: Array  # (N,)
     level: Array  # (N,)
     first: Array  # (cells,) the last ball that has entered, or -1
-    others: Array  # (N,) behind each ball in the list of its cell, or -1
+    others: Array  # (N,) the next ball in the list of the cell, or -1
     begin: Array  # (levels,) the number of the first cell
     shape: Array  # (levels, 3) cells along each axis
     inverse: Array  # (levels, 3) 1/width of a cell
     low: Array  # (3,) the lowest corner
-    period: Array  # (3,) of a direction that repeats, else 0
+    period: Array  # (3,) the period of a periodic direction, else 0
     repeats: Array  # (3,) 1/period, or 0
 
 
 def order_of(radius: Floats) -> NDArray[np.int64]:
-    """The numbers of balls from the largest to the smallest."""
+    """Return the numbers of balls from the largest to the smallest."""
     return np.argsort(-radius, kind="stable")
 
 
 def empty_cells(low: Floats, high: Floats, period: tuple[float | None, ...] | None, radius: Floats) -> CellLists:
-    """The lists of balls of these radii in a box, none of which has entered."""
+    """Return empty lists for balls of these radii in a box."""
     sizes = np.unique(np.floor(np.log2(radius.max() / radius)).astype(np.int64), return_inverse=True)
     level, n = np.asarray(sizes[1]), radius.size
     lengths = np.array([length or 0.0 for length in period or (None,) * 3])
@@ -51,7 +51,7 @@ def empty_cells(low: Floats, high: Floats, period: tuple[float | None, ...] | No
     begin, shapes, inverses, cells = [], [], [], 0
     for k in range(len(sizes[0])):
         mine = radius[level == k]
-        # Not many more cells than balls: of a few in a large volume most would be empty.
+        # Not many more cells than balls: with few balls in a large volume most would be empty.
         width = np.full(3, 2.0 * mine.max())
         wide = extent > width
         room = float(np.prod(extent[wide] / width[wide])) / max(2.0 * mine.size, 64.0)
@@ -72,27 +72,27 @@ def empty_cells(low: Floats, high: Floats, period: tuple[float | None, ...] | No
 
 
 def _layer(cells, level, axis, x):
-    """The layer of cells in which a coordinate is."""
+    """Return the layer of cells of a coordinate."""
     return int(layer_of((x - cells.low[axis]) * cells.inverse[level, axis], cells.shape[level, axis]))
 
 
 def _around(cells, level, axis, x):
-    """The layers around one, from the first to the one after the last; they may go on beyond a period."""
+    """Return the layers around that of x, from the first to the end; they may continue beyond a period."""
     count, middle = cells.shape[level, axis], _layer(cells, level, axis, x)
     repeats = (cells.period[axis] > 0.0) & (count > 2)
     return select(repeats, middle - 1, max(middle - 1, 0)), select(repeats, middle + 2, min(middle + 2, count))
 
 
 def _apart(cells, axis, x):
-    """A difference of coordinates, of the nearest images."""
+    """Return a difference of coordinates, of the nearest images."""
     return x - cells.period[axis] * np.floor(x * cells.repeats[axis] + 0.5)
 
 
 @outlined
 def _met(cells, r, radius, stops):
-    """Of the balls that overlap one at r: (how many, the number of the deepest or -1, by how much).
+    """Return (the number of overlaps with a ball at r, the deepest ball or -1, its overlap).
 
-    If it `stops`, the first one is enough.
+    With `stops` the search ends at the first one.
     """
     count, deepest, most = 0, -1, 0.0
     for k in range(cells.begin.size):
@@ -123,7 +123,7 @@ def _met(cells, r, radius, stops):
 
 
 def _enter(cells, i, r):
-    """Ball i is at r from now on."""
+    """Enter ball i at r."""
     level = index(cells.level[i])
     x, y, z = _layer(cells, level, 0, r.x), _layer(cells, level, 1, r.y), _layer(cells, level, 2, r.z)
     shape = Vec(cells.shape[level, 0], cells.shape[level, 1], cells.shape[level, 2])
@@ -135,7 +135,7 @@ def _enter(cells, i, r):
 
 @kernel
 def _find_free(cells, points, radius, free):
-    """Whether balls at points (3, n) would overlap none that has entered, into `free`."""
+    """Set `free` to whether balls at points (3, n) would overlap none that has entered."""
     for i in range(points.shape[1]):
         count, _deepest, _most = _met(cells, column(points, 0, i), radius[i], True)
         free[i] = count == 0
@@ -143,7 +143,7 @@ def _find_free(cells, points, radius, free):
 
 @kernel
 def _enter_free(cells, points, numbers, done):
-    """Let balls of these numbers enter at points (3, n) where they overlap none, those that are not `done`."""
+    """Enter balls with these numbers at points (3, n) where they overlap none, unless they are `done`."""
     for i in range(points.shape[1]):
         number = index(numbers[i])
         if not done[number]:
@@ -156,7 +156,7 @@ def _enter_free(cells, points, numbers, done):
 
 @kernel
 def _enter_all(cells, points, order, found):
-    """Let all balls enter, in this order: `found` gets how many pairs overlap, the deepest pair, and by how much."""
+    """Enter all balls in this order; set `found` to the number of overlapping pairs, the deepest pair, its overlap."""
     for i in range(order.size):
         number = index(order[i])
         r = column(points, 0, number)
@@ -174,27 +174,27 @@ class Overlaps(NamedTuple):
     """The pairs of balls that overlap."""
 
     number: int
-    pair: tuple[int, int]  # those that overlap most, the smaller number first
-    depth: float  # by how much these do [m]
+    pair: tuple[int, int]  # the deepest pair, the smaller number first
+    depth: float  # its overlap [m]
 
 
 def find_free(cells: CellLists, points: Floats, radius: Floats) -> NDArray[np.bool_]:
-    """Whether balls at points (3, n) would overlap none that has entered."""
+    """Return whether balls at points (3, n) would overlap none that has entered."""
     free = np.empty(points.shape[1], np.bool_)
     _tier(_find_free, points)(cells, points, radius, free)
     return free
 
 
 def enter_free(cells: CellLists, points: Floats, numbers: NDArray[np.int64], done: NDArray[np.bool_]) -> None:
-    """Let balls of these numbers, which may come again, enter at points (3, n) where they overlap none.
+    """Enter balls with these numbers, which may repeat, at points (3, n) where they overlap none.
 
-    `done` says which have entered; they are to be no larger than these.
+    `done` marks the balls that have entered; no ball may be larger than they are.
     """
     _tier(_enter_free, points)(cells, points, numbers, done)
 
 
 def overlaps_of(position: Floats, radius: Floats, period: tuple[float | None, ...] | None = None) -> Overlaps | None:
-    """The overlaps of balls at positions (3, N), with their images where these repeat, or None without overlaps."""
+    """Return the overlaps of balls at positions (3, N), and with images if periodic, or None without overlaps."""
     low, high = position.min(axis=1), position.max(axis=1)
     cells, found = empty_cells(low, high, period, radius), np.zeros(4)
     _tier(_enter_all, position)(cells, position, order_of(radius), found)

@@ -1,4 +1,4 @@
-"""The volume of a scene in closed form, where that is certain."""
+"""The volume of a scene in closed form, if that is certain."""
 
 import itertools
 import math
@@ -20,9 +20,9 @@ class Occupied(NamedTuple):
 
 
 def closed_form(scene: Scene) -> float | None:
-    """The admissible volume at 0 s [m^3], in a scene with a plane the area [m^2], or None.
+    """Return the admissible volume at 0 s [m^3], in a scene with a plane the area [m^2], or None.
 
-    It is that of one cavity, or of a cell that repeats, less those of solids within it that do not overlap.
+    It is the volume of one cavity, or of a periodic cell, minus that of solids within it that do not overlap.
     """
     there = [surface for surface in scene.surfaces if surface.is_there(0.0)]
     cavities = [surface for surface in there if not surface.is_solid()]
@@ -59,14 +59,14 @@ def _is_within(scene: Scene, cavity: Surface, one: Occupied) -> bool:
 
 
 def _whole(scene: Scene, points: Floats) -> Floats:
-    """Points of the axes of a scene, in space (3, N)."""
+    """Return points (3, N) in space, from their coordinates along the axes of a scene."""
     whole = np.zeros((3, points.shape[1]))
     whole[scene.axes()] = points
     return whole
 
 
 def _are_apart(one: Occupied, other: Occupied, lengths: Floats | None) -> bool:
-    """Whether two solids, and their images in a cell of these lengths, certainly do not overlap."""
+    """Whether two solids, and their images in a cell with these lengths, certainly do not overlap."""
     between = np.abs(one.middle - other.middle)
     if lengths is not None:
         between = np.abs(between - lengths * np.round(between / lengths))

@@ -22,15 +22,15 @@ from .fitting_shapes import require_shapes
 from .sequential import VolumeBox, is_sparse, place_balls, require_packing, require_size
 
 _BATCH = 1 << 18
-# Trials for each point that is asked for, before a whole batch is looked at.
+# Trials for each requested point, before a whole batch is tested.
 _TRIALS_A_POINT, _FEWEST_TRIALS = 8, 64
-# The search ends if fewer than one in a million points was admissible: of this many, or earlier if by so many standard
-# deviations of the number that one in a million would be.
+# The search ends if fewer than one in a million points is admissible: of this number, or earlier if the number found
+# is below that by this number of standard deviations.
 _LEAST, _TRIES, _CLEARLY = 1e-6, 20_000_000, 2.0
-# Of balls the volume is estimated from as many admissible points, to 0.1 %.
+# The volume of balls is estimated from this number of admissible points, to 0.1 %.
 _POINTS = 1 << 18
-# So many of these points tell whether balls are few, if the answer is so many standard deviations from the other one;
-# so many points are looked at together.
+# The points that decide whether balls are few, if the answer is certain to this number of standard deviations, and the
+# points that are tested together.
 _SOME, _CERTAIN, _AT_ONCE = 1 << 15, 7.0, 1 << 14
 _INSTEAD = "the particles as arrays, a CSV file or a source with a volume"
 
@@ -47,14 +47,14 @@ def fill(  # noqa: PLR0913  the keywords are the public interface
     radius: ArrayLike | None = None,
     within: Surface | None = None,
 ) -> Particles:
-    """N particles, uniform in the admissible volume, with isotropic or Maxwellian velocities.
+    """Return n particles, uniform in the admissible volume, with isotropic or Maxwellian velocities.
 
     Args:
         scene: its volume must be bounded.
         n: number of particles, 1 or more.
         speed: |v| of every particle [m/s], from 0 to 1e100, in a direction uniform on the sphere; or
         temperature: k_B T [J], from 0 to 1e100: each component of v is normal with variance temperature/mass. The mean
-            kinetic energy of n particles is 3/2 of it by expectation only, with a relative standard deviation of
+            kinetic energy of n particles is 3/2 of it only in the mean, with a relative standard deviation of
             sqrt(2/(3 n)): 26 % of 10 particles, 0.8 % of 10 000. In a scene with a plane there are two components, the
             energy is k_B T, and its deviation sqrt(1/n).
         mass: one number or (n,) [kg], above 0.
@@ -64,19 +64,19 @@ def fill(  # noqa: PLR0913  the keywords are the public interface
             sqrt(mass temperature/n): walls change it, and to take it out would leave fewer than 3 n degrees of freedom.
         radius: one number or (n,) [m], above 0: balls, at places where they overlap neither one another nor the walls,
             one after the other, the largest first; None: points, which do not meet one another.
-        within: a volume, a surface as an opening is: particles start in the part of the scene within it, and only that
-            part has to be bounded; balls are wholly in it. None: in all of the scene.
+        within: a volume, a surface as an opening is: particles start in the part of the scene within it, and only this
+            part must be bounded; balls are wholly in it. None: in all of the scene.
 
     Returns:
-        The particles; their `volume` is the admissible volume of points [m^3], of that part of it with `within`; in a
-        scene with a plane all of them are in it, and it is the admissible area [m^2]. It is a closed form where the
-        scene is one cavity that has one, or a cell that repeats, less solids within that do not overlap; else it is
+        The particles; their `volume` is the admissible volume of points [m^3], or of its part with `within`; in a
+        scene with a plane all of them are in the plane, and it is the admissible area [m^2]. It is a closed form if the
+        scene is one cavity that has one, or a periodic cell, minus solids within that do not overlap; else it is
         estimated from the random points, and `volume_error` is the standard error.
 
     Raises:
         SceneError: an argument is out of its range, both or neither of speed and temperature are given, the
             volume is open, exact without a temperature, too thin for random points to find it, or too full: balls fill
-            at most 0.35 of it at random places, discs in a plane 0.5; `pack` makes more of them.
+            at most 0.35 of it at random places, discs in a plane 0.5; `pack` makes denser packings.
 
     >>> import swarm
     >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
@@ -92,7 +92,7 @@ def fill(  # noqa: PLR0913  the keywords are the public interface
     seed = checks.count("seed", seed, least=0)
     speed, temperature = check_velocities("fill", speed, temperature, exact)
     random = np.random.default_rng(seed)
-    # Checks the masses too; velocities follow, since a Maxwellian needs the masses.
+    # Checks the masses too; velocities follow, since a Maxwellian distribution needs the masses.
     if radius is None:
         points, volume = _few_points(scene, n, seed, random) or _points(scene, n, random)
         particles = Particles(points, np.zeros((3, n)), mass)
@@ -108,7 +108,7 @@ def fill(  # noqa: PLR0913  the keywords are the public interface
 def check_velocities(
     user: str, speed: float | None, temperature: float | None, exact: bool
 ) -> tuple[float | None, float | None]:
-    """The speed and the temperature as numbers; a `SceneError` unless they say how fast particles are."""
+    """Return the speed and the temperature as numbers; raise a `SceneError` unless exactly one is given."""
     if (speed is None) == (temperature is None):
         came = "neither" if speed is None else "both"
         raise SceneError(f"{user} needs one of speed and temperature, got {came}")
@@ -133,13 +133,13 @@ def fill_velocities(
         particles.velocity = normal * (speed / np.sqrt((normal**2).sum(axis=0)))
     elif temperature is not None:
         if exact:
-            # Of each component, sum(m v^2)/3n = T where the sum of the squares is 3 n; of two in a plane 2 n.
+            # Each component has sum(m v^2)/3n = T if the sum of the squares is 3 n; of two in a plane 2 n.
             normal *= np.sqrt(len(scene.axes()) * n / (normal**2).sum())
         particles.velocity = normal * np.sqrt(temperature / particles.mass)
 
 
 def _place(scene: Scene, particles: Particles, random: np.random.Generator) -> Callable[[], VolumeEstimate]:
-    """Put balls where they overlap nothing; returns what measures the volume."""
+    """Put balls where they overlap nothing; return the function that measures the volume."""
     assert particles.radius is not None
     require_shapes(scene, particles.radius)
     require_size(scene, particles.radius)
@@ -152,7 +152,7 @@ def _place(scene: Scene, particles: Particles, random: np.random.Generator) -> C
 
 
 def room_of(scene: Scene, random: np.random.Generator, user: str) -> VolumeBox:
-    """The volume of a scene, from random points, for the `user` that a sentence names."""
+    """Return the volume of a scene, from random points, for the `user` that a message names."""
     low, high = bounding_box(scene, user, _INSTEAD)
     axes = scene.axes()
     box, found, tried = float(np.prod((high - low)[axes])), 0, 0
@@ -168,9 +168,9 @@ def room_of(scene: Scene, random: np.random.Generator, user: str) -> VolumeBox:
 
 
 def _roomy(scene: Scene, radius: Floats, random: np.random.Generator) -> VolumeBox | None:
-    """What `room_of` returns, with the volume for later, where some of its points show that balls fill little of it.
+    """Return the result of `room_of`, with the volume for later, if some of its points show that balls fill little.
 
-    Returns None, with nothing drawn, where balls fill more, or where these do not tell how many points it would draw.
+    Return None, with nothing drawn, if balls fill more, or if the number of points it would draw is not certain.
     """
     low, high = bounding_box(scene, "fill", _INSTEAD)
     if _is_its_box(scene, low, high):
@@ -190,7 +190,7 @@ def _roomy(scene: Scene, radius: Floats, random: np.random.Generator) -> VolumeB
 
 
 def _measured(scene: Scene, state: Any) -> VolumeEstimate:
-    """The volume that `room_of` finds from a state of a generator."""
+    """Return the volume that `room_of` finds from a state of a generator."""
     if (exact := _exact(scene)) is not None:
         return exact
     random = np.random.default_rng(0)
@@ -199,22 +199,22 @@ def _measured(scene: Scene, state: Any) -> VolumeEstimate:
 
 
 def _exact(scene: Scene) -> VolumeEstimate | None:
-    """The volume in closed form, or None."""
-    from .closed_form import closed_form  # loaded where a volume is asked for
+    """Return the volume in closed form, or None."""
+    from .closed_form import closed_form  # loaded only for volumes
 
     volume = closed_form(scene)
     return None if volume is None else VolumeEstimate(volume, 0.0)
 
 
 def _content(scene: Scene, box: float, found: int, tried: int) -> VolumeEstimate:
-    """The volume in closed form, else the part of a box that as many of the tried points have found."""
+    """Return the volume in closed form, else that of a box times the share of tried points that are admissible."""
     share = found / tried
     # The share of n points has the variance p (1 - p)/n.
     return _exact(scene) or VolumeEstimate(box * found / tried, box * math.sqrt(share * (1.0 - share) / tried))
 
 
 def _is_its_box(scene: Scene, low: Floats, high: Floats) -> bool:
-    """Whether all of the box is admissible: its corners are, and the cavities are convex."""
+    """Whether the whole box is admissible: its corners are, and the cavities are convex."""
     if scene.period is not None or any(one.openings or one.may_be_passed() for one in scene.surfaces):
         return False
     corners = np.array(list(itertools.product(*np.hstack([low, high])))).T
@@ -222,9 +222,9 @@ def _is_its_box(scene: Scene, low: Floats, high: Floats) -> bool:
 
 
 def _admitted(scene: Scene, low: Floats, high: Floats, random: np.random.Generator, count: int) -> int:
-    """How many of the first points of the next batch are admissible; the generator draws none of them.
+    """Return the number of admissible points among the first of the next batch; the generator draws none of them.
 
-    Points are made some at a time, as many as the cache holds.
+    Points are made in parts that fit in the cache.
     """
     draws, found = [], 0
     for k in range(len(scene.axes())):
@@ -240,7 +240,7 @@ def _admitted(scene: Scene, low: Floats, high: Floats, random: np.random.Generat
 
 
 def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]:
-    """The lower and the upper corner (3, 1) of a box around the admissible volume; a SceneError if that is open."""
+    """Return the lower and upper corner (3, 1) of a box around the admissible volume, or raise a SceneError if open."""
     low, high = (np.array(corner)[:, None] for corner in scene.bounds())
     if not np.isfinite(high - low).all():
         raise SceneError(
@@ -251,7 +251,7 @@ def bounding_box(scene: Scene, user: str, instead: str) -> tuple[Floats, Floats]
 
 
 def _other_sign(scene: Scene) -> str:
-    """What to add where a formula has the sign that a cavity does not have; else ""."""
+    """Return the advice if a formula has the sign opposite to that of a cavity, else ""."""
     from ..surfaces import Formula  # a wing, which few scenes load
 
     for i, one in enumerate(scene.surfaces):
@@ -270,9 +270,9 @@ def _other_sign(scene: Scene) -> str:
 def _few_points(
     scene: Scene, n: int, seed: int, random: np.random.Generator
 ) -> tuple[Floats, Callable[[], VolumeEstimate]] | None:
-    """What `_points` returns, from the first trials of its batch, with the volume for later.
+    """Return the result of `_points`, from the first trials of its batch, with the volume for later.
 
-    Returns None, with nothing drawn, if n admissible points are not among those trials.
+    Return None, with nothing drawn, if n admissible points are not among these trials.
     """
     trials = max(_FEWEST_TRIALS, _TRIALS_A_POINT * n)
     if trials >= _BATCH:
@@ -292,12 +292,12 @@ def _few_points(
 
 
 def _volume_of(scene: Scene, seed: int) -> VolumeEstimate:
-    """The volume in closed form, else from the first batch of random points of a seed."""
+    """Return the volume in closed form, else from the first batch of random points of a seed."""
     return _exact(scene) or _points(scene, 1, np.random.default_rng(seed))[1]()
 
 
 def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, Callable[[], VolumeEstimate]]:
-    """Admissible points, and the volume from their share of the random points of the bounding box."""
+    """Return admissible points, and the volume from their share of the random points of the bounding box."""
     low, high = bounding_box(scene, "fill", _INSTEAD)
     points, found, tried, admissible = np.empty((3, n)), 0, 0, 0
     axes = scene.axes()
@@ -316,9 +316,9 @@ def _points(scene: Scene, n: int, random: np.random.Generator) -> tuple[Floats, 
 
 
 def _require_share(scene: Scene, user: str, corners: tuple[Floats, Floats], found: int, tried: int) -> None:
-    """Raise a `SceneError` where next to none of the random points between two corners are admissible."""
+    """Raise a `SceneError` if next to none of the random points between two corners are admissible."""
     least = _LEAST * tried
-    # Poisson's: the variance is the mean.
+    # Poisson statistics: the variance is the mean.
     if found < least and (tried >= _TRIES or least - found > _CLEARLY * math.sqrt(least)):
         (low, high), axes = corners, scene.axes()
         raise SceneError(

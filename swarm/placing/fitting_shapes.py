@@ -1,4 +1,4 @@
-"""Which walls balls may meet, for what places them and what runs them."""
+"""Which walls balls may meet, for their placement and for runs."""
 
 import math
 
@@ -9,7 +9,7 @@ from ..surfaces.surface import Surface, shown
 
 
 def _nearest_lid(scene: Scene, surface: Surface) -> float:
-    """How far walls of a surface that are parallel to the plane of a scene are from that, where there are any [m]."""
+    """Return the distance of the nearest wall parallel to the plane of a scene, infinite without such walls [m]."""
     across = scene.across()
     if across is None:
         return math.inf
@@ -17,7 +17,7 @@ def _nearest_lid(scene: Scene, surface: Surface) -> float:
 
 
 def require_shapes(scene: Scene, radius: Floats) -> None:
-    """Raise a `SceneError` where balls with these radii may not meet a surface of the scene."""
+    """Raise a `SceneError` if balls with these radii may not meet a surface of the scene."""
     for i, surface in enumerate(scene.surfaces):
         why = surface.why_no_balls()
         if why is not None:
@@ -32,8 +32,8 @@ def require_shapes(scene: Scene, radius: Floats) -> None:
         if lid < radius[largest]:
             raise SceneError(
                 f"surfaces[{i}] ({type(surface).__name__}) must be as far from the plane as the largest radius, "
-                f"{radius[largest]:g} m of particle {largest}, where it is across it, got {lid:g} m; make it endless, "
-                f"or longer along {scene.plane}"
+                f"{radius[largest]:g} m of particle {largest}, at its walls parallel to the plane, got {lid:g} m; make "
+                f"it endless, or longer along {scene.plane}"
             )
         if not radius[largest] < surface.largest_ball():
             where = surface.most_bent_at()
@@ -46,7 +46,7 @@ def require_shapes(scene: Scene, radius: Floats) -> None:
 
 
 def _surer(surface: Surface) -> str:
-    """How a larger radius of curvature becomes certain, where that is known only by a bound of second derivatives."""
+    """Return advice on how a larger radius of curvature becomes certain, if only second derivatives bound it."""
     bounds = [part.curvature for part in surface.surfaces() if hasattr(part, "curvature")]
     if not bounds:
         return ""

@@ -14,26 +14,26 @@ from ..state import Floats
 from .cells import CellLists, empty_cells, enter_free, find_free, order_of
 from .vacant import Vacant
 
-# The largest packings, in space and in a plane. Random sequential addition ends at 0.384 and 0.547, where a place for
-# the last takes longer and longer.
+# The densest packings, in space and in a plane. Random sequential addition ends at 0.384 and 0.547, where the last
+# balls take longer and longer.
 _DENSEST = {3: 0.35, 2: 0.5}
 _ABOUT = 1.01
-# A cell that repeats holds a ball and its nearest image apart: this many radii.
+# A periodic cell holds a ball and its nearest image apart: at least this number of radii.
 _APART = 4.0
-# A ball that is as wide as its vessel but for round-off fits.
+# A ball as wide as its vessel fits, within this round-off.
 _CLOSE = 1e-12
-# Places that are tried together, and of so many balls.
+# The most and the fewest places that are tried together, and the balls for them.
 _MOST, _LEAST, _WINDOW = 1 << 18, 256, 1 << 16
-# The search ends after this many places for each of the balls: of 0.35 it takes 160, of 0.5 in a plane 90.
+# The search ends after this number of places for each ball: a packing of 0.35 takes 160, of 0.5 in a plane 90.
 _TRIES, _ALWAYS = 4000, 2_000_000
-# Where fewer tries than this find a place, it is looked where places are left. Balls are of one size up to this part.
+# If fewer tries than this find a place, vacant places are searched. Balls down to this fraction count as one size.
 _RARE, _ALIKE = 0.05, 0.9
-# Places in a search for each ball, or for each box that is left.
+# Places in a search for each ball, or for each vacant box.
 _SEARCHED = 8
 
 
 class VolumeBox(NamedTuple):
-    """What is known of a volume: a box around it (3, 1), and what measures it."""
+    """A volume: a box around it (3, 1), and the function that measures it."""
 
     low: Floats
     high: Floats
@@ -41,7 +41,7 @@ class VolumeBox(NamedTuple):
 
     @property
     def volume(self) -> float:
-        """How large it is."""
+        """Return the measured volume."""
         return self.measured().volume
 
 
@@ -66,7 +66,7 @@ def require_size(scene: Scene, radius: Floats) -> None:
 
 
 def require_packing(scene: Scene, radius: Floats, room: VolumeBox, most: float | None = None) -> float:
-    """The packing of balls in a volume; a `SceneError` where it is more than can be filled at random, or `most`."""
+    """Return the packing of balls in a volume; raise a `SceneError` above `most`, or above the densest random one."""
     axes = len(scene.axes())
     packing = balls_volume(scene, radius) / room.volume
     densest = _DENSEST[axes] if most is None else most
@@ -86,7 +86,7 @@ def is_sparse(scene: Scene, radius: Floats, room: VolumeBox) -> bool:
 
 
 def packing_of(scene: Scene, radius: Floats, room: VolumeBox) -> str:
-    """Balls in a volume, for a sentence."""
+    """Describe the balls in a volume, for a message."""
     unit, kind = ("m^3", "balls") if scene.plane is None else ("m^2", "discs")
     size = f"{radius[0]:g} m" if radius.min() == radius.max() else f"{radius.min():g} to {radius.max():g} m"
     return (
@@ -98,10 +98,10 @@ def packing_of(scene: Scene, radius: Floats, room: VolumeBox) -> str:
 def place_balls(
     scene: Scene, radius: Floats, room: VolumeBox, random: np.random.Generator, wide: Floats | None = None
 ) -> Floats:
-    """Places (3, N) of balls of these radii, uniform among those where they overlap nothing, one after the other.
+    """Return places (3, N) of balls of these radii, uniform where they overlap nothing, one after the other.
 
-    The largest come first: a place for them is rare among the small ones. `wide` are their radii for walls, if these
-    are others.
+    The largest come first: a place for them is rare among the small ones. `wide` are their radii for walls, if they
+    differ.
 
     Raises:
         SceneError: no place was found for some of them.
@@ -112,12 +112,12 @@ def place_balls(
     tried, fitting, share = 0, 0, 1.0
     vacant: Vacant | None = None
     while waiting.size:
-        # Those of about one size come before smaller ones.
+        # Balls of about one size come before smaller ones.
         some = waiting[:_WINDOW][radius[waiting[:_WINDOW]] >= _ALIKE * radius[waiting[0]]]
         least = some[-1]
         if vacant is not None and radius[least] < vacant.radius:
             vacant = None
-        # Where as many places are to be tried as there is to search
+        # If at least as many places would be tried as there are to search
         if share < _RARE and some.size / share > _SEARCHED * (radius.size if vacant is None else len(vacant)):
             vacant = _searched(scene, cells, room, (float(radius[least]), float(wide[some].min())), vacant)
         if (vacant is not None and not len(vacant)) or tried > _ALWAYS + _TRIES * radius.size:
@@ -134,7 +134,7 @@ def place_balls(
 def _searched(
     scene: Scene, cells: CellLists, room: VolumeBox, sizes: tuple[float, float], vacant: Vacant | None
 ) -> Vacant:
-    """Where balls of this radius, for others and for walls, may still be."""
+    """Return the boxes where balls of this radius, for others and for walls, may still be."""
     if vacant is None:
         return Vacant(scene, cells, room.low, room.high, *sizes)
     vacant.refine()
@@ -150,8 +150,8 @@ def _points(scene: Scene, room: VolumeBox, n: int, random: np.random.Generator) 
 def _enter(
     scene: Scene, cells: CellLists, points: Floats, numbers: NDArray[np.int64], done: NDArray[np.bool_], wide: Floats
 ) -> int:
-    """Let balls of these numbers enter where they overlap nothing: how many of the places are within the walls."""
-    # Most places overlap a ball where many have entered, which is looked up faster than where the walls are.
+    """Enter balls with these numbers where they overlap nothing; return the number of places within the walls."""
+    # With many balls most places overlap one, which is faster to test than the walls.
     radius: Floats = cells.radius[numbers]  # type: ignore[assignment]
     free = np.flatnonzero(find_free(cells, points, radius)) if done.any() else np.arange(numbers.size)
     free = free[admits(scene, points[:, free], wide[numbers[free]])]
@@ -160,7 +160,7 @@ def _enter(
 
 
 def admits(scene: Scene, points: Floats, radius: Floats) -> NDArray[np.bool_]:
-    """Whether balls at points (3, N) are within the walls."""
+    """Return whether balls at points (3, N) are within the walls."""
     found = scene.admits(points)
     if scene.surfaces:
         found[found] = scene.admits(points[:, found], radius[found])
@@ -174,7 +174,7 @@ def _full(
     if not done.any() and not fitting:
         return SceneError(
             f"radius must leave a place within the walls, got {radius[first]:g} m of particle {first}, for which none "
-            f"of {tried} random places is; use smaller balls, or a larger vessel"
+            f"of {tried} random places is large enough; use smaller balls, or a larger vessel"
         )
     reached = balls_volume(scene, radius[done]) / room.volume
     return SceneError(

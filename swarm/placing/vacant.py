@@ -1,6 +1,6 @@
-"""Where a ball may still be placed among others: small boxes, outside of which there is certainly no place.
+"""Places where a ball may still be put among others: small boxes, outside of which there is certainly no place.
 
-Random places within them are uniform among all places that are left, and are found however few these are.
+Random places within them are uniform among all places that are left, and are found even if these are few.
 """
 
 import math
@@ -12,14 +12,14 @@ from ..scene import Scene
 from ..state import Floats
 from .cells import CellLists, find_free
 
-# The width of the first boxes, as a part of the radius, unless there were more than so many for each ball, and some.
+# The width of the first boxes, as a fraction of the radius, and the most boxes for each ball and in addition.
 _WIDTH, _MOST, _SOME = 0.7, 48, 1_000_000
-# Boxes that are looked at together.
+# Boxes that are tested together.
 _AT_ONCE = 1 << 19
 
 
 class Vacant:
-    """The boxes that are left for balls of a radius or more, among those in `cells` and within the walls of a scene.
+    """The boxes that are left for balls of a radius or more, among balls in `cells` and within the walls of a scene.
 
     Args:
         low, high: corners (3, 1) of a box around the volume.
@@ -46,7 +46,7 @@ class Vacant:
         return int(self._boxes.shape[1])
 
     def refine(self) -> None:
-        """Halve the boxes along each axis, and drop those in which there is no place any more."""
+        """Halve the boxes along each axis, and drop those without a place."""
         boxes = self._left(self._boxes)
         if boxes.shape[1] * 2 ** len(self._axes) > 4 * (_MOST * self._cells.radius.size + _SOME):
             self._boxes = boxes
@@ -61,7 +61,7 @@ class Vacant:
         self._boxes = np.concatenate(parts, axis=1) if parts else boxes
 
     def points(self, n: int, random: np.random.Generator) -> Floats:
-        """Random points (3, n) in the boxes."""
+        """Return random points (3, n) in the boxes."""
         points = np.zeros((3, n))
         chosen = self._boxes[:, random.integers(len(self), size=n)]
         within = chosen[self._axes] + random.random((len(self._axes), n))
@@ -69,14 +69,14 @@ class Vacant:
         return points
 
     def _left(self, boxes: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Those of the boxes in which there may be a place."""
-        # From the middle of a box to its corners [m].
+        """Return the boxes in which there may be a place."""
+        # The distance from the middle of a box to its corners [m].
         reach, n = 0.5 * math.sqrt(float((self._width[self._axes] ** 2).sum())), boxes.shape[1]
         if not n or reach >= self.radius:
             return boxes
         middles = np.zeros((3, n))
         middles[self._axes] = self._low[self._axes] + (boxes[self._axes] + 0.5) * self._width[self._axes, None]
-        # Where all corners of a box are nearer to a ball than balls may be, so is every point in it.
+        # If all corners of a box are nearer to a ball than balls may be, so is every point in it.
         kept = np.flatnonzero(find_free(self._cells, middles, np.full(n, self.radius - reach)))
         if self._scene.surfaces and kept.size:
             far = self._scene.distances_outside(middles[:, kept], 0.0, np.full(kept.size, self._wide))

@@ -1,1 +1,1 @@
-"""Sources: particles that come during a run, where they are born, when, and with which velocity."""
+"""Sources: particles that come during a run, with the places, times and velocities of their births."""

@@ -1,4 +1,4 @@
-"""The places at which balls of a source may be born, in blocks that are drawn when they are needed."""
+"""The places at which balls of a source may be born, in blocks that are drawn when needed."""
 
 import logging
 from dataclasses import replace
@@ -14,30 +14,30 @@ from .places import PointBatches, changes, place_of
 from .source import Source
 
 _LOG = logging.getLogger("swarm")
-# Places of a block; so many rounds of as many places are tried for one.
+# The places of a block, and the most rounds of as many places that are tried for it.
 _BLOCK, _MOST_ROUNDS = 1024, 256
-# A ball that is born at a wall is so much of its radius away from it.
+# A ball that is born at a wall is at this fraction of its radius from it.
 _CLEAR = 1e-9
-# What to do, and what came, by the argument that can be changed: of balls, and of bodies, which have a size.
+# The advice, and the failed search, by the argument that can be changed: for balls, and for bodies, which have a size.
 _MEND = {"radius": "use smaller balls, or a larger source", "where": "move it, or make it larger"}
 _LACKING = {
-    "radius": "got {:g} m, for which none of {} random places is; ",
-    "where": "got none for the ball of {:g} m around a body, of {} random places; ",
+    "radius": "got {:g} m, for which none of {} random places is large enough; ",
+    "where": "got none that is large enough for the ball of {:g} m around a body, of {} random places; ",
 }
 
 
 class BallPlaces:
-    """Places, each with a velocity, uniform where the largest ball of a source is within all walls that are at rest.
+    """Places, each with a velocity, uniform where the largest ball of a source is within all walls at rest.
 
     Args:
         scene: the vessel.
-        source: of balls.
+        source: a source of balls.
         k: the number of the source.
-        seed: of the run.
-        sized: the argument of the source that a sentence asks to change.
+        seed: the seed of the run.
+        sized: the argument of the source that a message asks to change.
 
     Attributes:
-        found: how many places of the last block differ; where there is hardly room for the ball they come again.
+        found: the number of different places in the last block; where there is hardly room for the ball they repeat.
 
     Raises:
         SceneError: there is no such place, or a beam does not lead into the vessel.
@@ -50,7 +50,7 @@ class BallPlaces:
         self._place = place_of(scene, source, name)
         self._points = PointBatches(scene, self._place, name)
         self.radius, self._across = source.largest(), scene.across()
-        # Of those of the scene the ball is inside of, not half of it.
+        # The ball is inside of walls of the scene as a whole, not half of it.
         is_wall = self._place.number is not None or bool(self._place.walls)
         self._shift = (1.0 + _CLEAR) * self.radius if is_wall and not self._place.volume else 0.0
         self._lasting = [i for i, one in enumerate(scene.surfaces) if not changes(one)]
@@ -58,13 +58,13 @@ class BallPlaces:
         self.block(0)
 
     def block(self, number: int) -> tuple[Floats, Floats]:
-        """The places and the velocities (3, 1024) of a block; a temperature is that of a mass of 1 kg."""
+        """Return the places and the velocities (3, 1024) of a block; a temperature is for a mass of 1 kg."""
         if number != self._known:
             self._known, self._drawn = number, self._draw(number)
         return self._drawn
 
     def at(self, k: int) -> tuple[Floats, Floats]:
-        """Place k, and its velocity, (3,) each."""
+        """Return place k and its velocity, (3,) each."""
         position, velocity = self.block(k // _BLOCK)
         return position[:, k % _BLOCK], velocity[:, k % _BLOCK]
 
@@ -94,7 +94,7 @@ class BallPlaces:
         return points, velocities_at(self._place, source, self._name, speeds, (points, normals), self._across)
 
     def _fits(self, points: Floats) -> Floats:
-        """Whether the largest ball is within all walls that are at rest."""
+        """Return whether the largest ball at each point is within all walls at rest."""
         if not self._lasting:
             return np.ones(points.shape[1], np.bool_)
         radius = np.full(points.shape[1], self.radius)
@@ -102,16 +102,16 @@ class BallPlaces:
 
 
 def ball_places(scene: Scene, particles: Particles, seed: int, sized: str = "radius") -> list[BallPlaces]:
-    """The places of each source of balls of a run, with this seed."""
+    """Return the places of each source of balls of a run, with this seed."""
     given = () if particles.births is None else particles.births.balls
     return [BallPlaces(scene, one, k, seed, sized) for k, one in enumerate(given)]
 
 
 def place_unborn(scene: Scene, particles: Particles, seed: int, sized: str = "radius") -> None:
-    """Give balls that are not yet born a place and a velocity of their source, until they are.
+    """Give balls that are not yet born a place and a velocity of their source until their birth.
 
     Raises:
-        SceneError: a source has no place for its balls; `sized` is the argument of it that can be changed.
+        SceneError: a source has no place for its balls; `sized` is its argument that can be changed.
     """
     for k, places in enumerate(ball_places(scene, particles, seed, sized)):
         assert particles.births is not None

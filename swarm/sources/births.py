@@ -1,4 +1,4 @@
-"""All births of a run, drawn before it from its seed: each source has streams of its own."""
+"""All births of a run, drawn before it from its seed: each source has its own streams."""
 
 import math
 from collections.abc import Callable
@@ -20,17 +20,17 @@ from ..surfaces.plane import along
 from .places import PointBatches, SourcePlace, changes, place_of
 from .source import Source
 
-# Streams of a source.
+# The streams of a source.
 _TIMES, PLACES, VELOCITIES, _SIZES, _SPINS = range(5)
-# Bytes of a particle in a run, its frames not counted.
+# Bytes of a particle in a run, without its frames.
 _PARTICLE = 500
-# So many standard deviations more births than are expected are reckoned with.
+# Memory is required for the expected number of births plus this number of standard deviations.
 _SIGMAS = 6.0
 # A birth outside of a moving wall by up to this part of the scene's extent counts as inside.
 _OUTSIDE = 1e-9
-# A birth at so many roundings before the stop is at it.
+# A birth within this number of roundings before the stop is at the stop.
 _ROUND_OFF = 4.0
-# Of the numbers of a Poisson process that are drawn at a time.
+# The numbers of a Poisson process that are drawn at a time.
 _BATCH = 4096
 
 
@@ -42,9 +42,9 @@ def with_births(
     until: float,
     times_taken: Callable[[Floats], Floats] = lambda times: times,
 ) -> Particles:
-    """The particles of a run with sources: those of the start, and behind them those that come, in order of time.
+    """Return the particles of a run with sources: those of the start, then those that come, in order of time.
 
-    `times_taken` are the times at which a method has particles come that are born at these times.
+    `times_taken` returns the times at which a method starts particles that are born at given times.
 
     Raises:
         SceneError: a source does not fit the scene, too many particles come, or the run has no particles at all.
@@ -104,7 +104,7 @@ def with_births(
 
 
 def _as_at_the_start(source: Source, name: str, particles: Particles | None) -> Source:
-    """The source with all that it leaves out: of balls the radius and the mass of those of the start, or 1 kg."""
+    """Return the source without missing arguments: balls have the radius and mass of those of the start, or 1 kg."""
     given: dict[str, Any] = {}
     if particles is not None and particles.radius is not None and source.radius is None:
         given["radius"] = _common(particles.radius, f"{name}.radius", "have radii", "m")
@@ -116,7 +116,7 @@ def _as_at_the_start(source: Source, name: str, particles: Particles | None) -> 
 
 
 def _common(values: Floats, name: str, have: str, unit: str) -> float:
-    """What all particles of the start have."""
+    """Return the value that all particles of the start have."""
     low, high = float(values.min()), float(values.max())
     if low != high:
         raise SceneError(
@@ -128,7 +128,7 @@ def _common(values: Floats, name: str, have: str, unit: str) -> float:
 def _sizes(
     scene: Scene, sources: tuple[Source, ...], number: NDArray[np.int32], seed: int
 ) -> tuple[Floats, Floats | None]:
-    """The radii (n,) and the spins (3, n), None if all are 0, of balls of sources with these numbers."""
+    """Return the radii (n,) and the spins (3, n), None if all are 0, of balls of sources with these numbers."""
     radius, spin = np.zeros(len(number)), np.zeros((3, len(number)))
     for k, one in enumerate(sources):
         own = np.flatnonzero(number == k)
@@ -145,7 +145,7 @@ def _sizes(
 
 
 def _require_room(sources: tuple[Source, ...], given: int, until: float) -> None:
-    """Raise a `SceneError` where more particles come than this machine has memory for."""
+    """Raise a `SceneError` if more particles come than fit in the memory of this machine."""
     most = float(given)
     for k, one in enumerate(sources):
         come, at_most = _most(one, until)
@@ -158,7 +158,7 @@ def _require_room(sources: tuple[Source, ...], given: int, until: float) -> None
 
 
 def _most(source: Source, until: float) -> tuple[float, float]:
-    """The number of births of a source that is expected, and the one that is reckoned with."""
+    """Return the expected number of births of a source, and the number for which memory is required."""
     if source.rate is None:
         number = float(source.count or 0) if source.times is None else float(len(source.times))
         return number, number
@@ -173,23 +173,23 @@ def _end(source: Source, until: float) -> float:
 
 
 def stream(seed: int, k: int, *what: int) -> Random:
-    """The random numbers of source k for one thing."""
+    """Return the random numbers of source k for one purpose."""
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(k, *what))))
 
 
 def _drawn(
     scene: Scene, source: Source, name: str, k: int, seed: int, until: float, times_taken: Callable[[Floats], Floats]
 ) -> tuple[Floats, Floats, Floats]:
-    """Times (n,), positions and velocities (3, n) of the births of a source."""
+    """Return times (n,), positions and velocities (3, n) of the births of a source."""
     times = times_of(source, stream(seed, k, _TIMES), until)
     if source.radius is not None:
-        # Where balls are born is known when they are: see ball_places.py.
+        # The places of balls are known at their births: see ball_places.py.
         return times, *np.zeros((2, 3, len(times)))
     times = times_taken(times)
     place = place_of(scene, source, name)
     points, across = PointBatches(scene, place, name), scene.across()
     require_in_plane(scene, source, name)
-    # A source without births is looked at too.
+    # A source without births is checked too.
     position, normals = points.draw(stream(seed, k, PLACES), max(1, len(times)))
     position, normals = position[:, : len(times)], normals[:, : len(times)]
     velocity = velocities_at(place, source, name, stream(seed, k, VELOCITIES), (position, normals), across)
@@ -222,9 +222,9 @@ def _require_beam(source: Source, name: str, position: Floats, normals: Floats) 
 
 
 def times_of(source: Source, random: Random, until: float) -> Floats:
-    """The times of the births of a source in a run, in order [s]: all up to its end, and that included.
+    """Return the times of the births of a source in a run, in order [s]: all up to and including its end.
 
-    A longer run has the same ones first: the frame at a time has the births up to then, whenever the run ends.
+    A longer run has the same first times: a frame has the births up to its time, whenever the run ends.
     """
     if source.times is not None:
         times = np.array(source.times)
@@ -247,7 +247,7 @@ def times_of(source: Source, random: Random, until: float) -> Floats:
 
 
 def _evenly_before_stop(source: Source) -> float:
-    """The number of evenly spaced births before the stop: one that is at it to round-off is not."""
+    """Return the number of evenly spaced births before the stop, without one that is at the stop to round-off."""
     if source.stop is None:
         return math.inf
     rate = source.rate or 0.0
@@ -256,7 +256,7 @@ def _evenly_before_stop(source: Source) -> float:
 
 
 def _require_free(scene: Scene, name: str, times: Floats, position: Floats) -> None:
-    """Raise a `SceneError` where a wall that moves, or comes and goes, is where a particle is born."""
+    """Raise a `SceneError` if a wall that moves, or comes and goes, is at the place of a birth."""
     for i, surface in enumerate(scene.surfaces):
         if not changes(surface):
             continue
@@ -266,20 +266,20 @@ def _require_free(scene: Scene, name: str, times: Floats, position: Floats) -> N
             raise SceneError(
                 f"{name} must be free when particles come, got a birth at {times[k]:g} s at "
                 f"{tuple(position[:, k].tolist())}, {depths[k]:.3g} m inside surfaces[{i}] ({type(surface).__name__}) "
-                "as it is then; move the source, or say with start and stop when it is free"
+                "at this time; move the source, or give a start and a stop between which it is free"
             )
 
 
 def _outside_then(scene: Scene, i: int, times: Floats, position: Floats) -> Floats:
-    """How far each place is outside of the admissible side of surface i at a time of its own [m]."""
+    """Return the distance of each place outside of the admissible side of surface i at its own time [m]."""
     surface = scene.surfaces[i]
     if surface.motion is not None and scene.period is None:
-        # In the frame in which it rests.
+        # In the frame in which the surface rests.
         rows = [motions.pose(surface.motion, t).given(position[:, [k]]) for k, t in enumerate(times.tolist())]
         depths = side_of(surface) * distances(surface.at_rest(), np.concatenate([position[:, :0], *rows], 1))
         return np.where([surface.is_there(t) for t in times.tolist()], depths, -np.inf)
     depths = np.empty(len(times))
-    # Between instants what does not move is as it is.
+    # Between instants surfaces at rest do not change.
     groups = np.searchsorted(scene.instants, times, side="right") if not scene.moves() else np.arange(len(times))
     for group in np.unique(groups):
         some = np.flatnonzero(groups == group)
@@ -290,7 +290,7 @@ def _outside_then(scene: Scene, i: int, times: Floats, position: Floats) -> Floa
 def velocities_at(
     place: SourcePlace, source: Source, name: str, random: Random, points: tuple[Floats, Floats], across: int | None
 ) -> Floats:
-    """Velocities (3, n) of births at points of a place, given with the normals there; both are put into the plane."""
+    """Return velocities (3, n) of births at points of a place with their normals; put both into the plane."""
     position, normals = points
     if place.volume:
         velocity = _from_volume(source, random, position.shape[1], across)
@@ -303,7 +303,7 @@ def velocities_at(
 
 
 def _from_volume(source: Source, random: Random, n: int, across: int | None) -> Floats:
-    """Velocities (3, n) of particles that are born in a volume."""
+    """Return velocities (3, n) of particles that are born in a volume."""
     if source.beam is not None:
         return _beam(source, random, n, across)
     normal = np.ascontiguousarray(random.standard_normal((n, 3)).T)
@@ -315,13 +315,13 @@ def _from_volume(source: Source, random: Random, n: int, across: int | None) -> 
 
 
 def _from_surface(source: Source, random: Random, normals: Floats, across: int | None) -> Floats:
-    """Velocities (3, n) of particles that come from a surface, against these unit normals."""
+    """Return velocities (3, n) of particles that come from a surface, against these unit normals."""
     n = normals.shape[1]
     if source.beam is not None:
         return _into(source, random, normals, across)
     first, second = _tangents(normals, across)
     if source.temperature is not None:
-        # The normal speed of what passes a plane in a gas at rest: w exp(-w^2/2).
+        # The normal speed of particles that pass a plane in a gas at rest: w exp(-w^2/2).
         away = np.sqrt(2.0 * random.standard_exponential(n))
         u, w = random.spawn(1)[0].standard_normal((n, 2)).T
         return np.asarray(_thermal(source) * (u * first + w * second - away * normals))
@@ -336,14 +336,14 @@ def _from_surface(source: Source, random: Random, normals: Floats, across: int |
 
 
 def _thermal(source: Source) -> float:
-    """sqrt(k_B T/m) of the gas that comes [m/s]."""
+    """Return sqrt(k_B T/m) of the gas that comes [m/s]."""
     assert source.temperature is not None
     assert source.mass is not None
     return math.sqrt(source.temperature / source.mass)
 
 
 def _tangents(normals: Floats, across: int | None) -> tuple[Floats, Floats]:
-    """Unit vectors along surfaces with these normals; in a plane one, and 0."""
+    """Return unit vectors along surfaces with these normals; in a plane one, and 0."""
     if across is not None:
         i, j = along(across)
         first = np.zeros_like(normals)
@@ -356,7 +356,7 @@ def _tangents(normals: Floats, across: int | None) -> tuple[Floats, Floats]:
 
 
 def _beam(source: Source, random: Random, n: int, across: int | None) -> Floats:
-    """Directions uniform in a cone about the beam."""
+    """Return velocities with directions uniform in a cone about the beam."""
     beam = np.array(source.beam)[:, None]
     if source.divergence == 0.0:
         return np.broadcast_to(beam, (3, n)).copy()
@@ -373,13 +373,13 @@ def _beam(source: Source, random: Random, n: int, across: int | None) -> Floats:
 
 
 def _into(source: Source, random: Random, normals: Floats, across: int | None) -> Floats:
-    """Velocities of a beam that are not into the wall, which the axis of the beam is not."""
+    """Return velocities of a beam that are not into the wall, as the axis of the beam is not."""
     n = normals.shape[1]
     velocity = _beam(source, random, n, across)
     while source.divergence > 0.0:
         wrong = np.flatnonzero((velocity * normals).sum(axis=0) >= 0.0)
         if not wrong.size:
             break
-        # Each try has a stream with a row for every birth, so that no birth takes what is another's.
+        # Each try has a stream with a row for every birth, so that no birth takes the numbers of another.
         velocity[:, wrong] = _beam(source, random.spawn(1)[0], n, across)[:, wrong]
     return velocity

@@ -21,17 +21,17 @@ from ..surfaces.surface import Box, Surface, volume_of
 from .source import Source
 
 _LOG = logging.getLogger("swarm")
-# Points that are tried at a time, so that a longer run has the same first births; fewer among meshes, of which the
-# nearest triangle of each point is looked for. And so many of these in all, as long as fewer than one in a million is a
-# place of a birth.
+# Points that are tried at a time, so that a longer run has the same first births; fewer among meshes, where the
+# nearest triangle of each point is searched. Then the most batches, as long as fewer than one in a million points is
+# the place of a birth.
 _BATCH, _FEW, _MOST_BATCHES = 1 << 14, 1 << 11, 250
-# The progress of the search is logged after so many batches, and after every doubling of their number.
+# The progress of the search is logged after this number of batches, and after every doubling of it.
 _FIRST_REPORT = 32
-# Of more of the points tried a source needs no advice: a million births at them take seconds.
+# A source with a larger share of the points tried needs no advice: a million births take seconds.
 _RARE = 0.01
-# Steps of a point onto its surface.
+# Steps that move a point onto its surface.
 _STEPS = 3
-# Of the extent, a way out of a wall on which no other part of a union is in that place.
+# The distance from a wall, as a fraction of the extent, at which no other part of a union may be.
 _BESIDE = 1e-8
 
 
@@ -39,11 +39,11 @@ class SourcePlace(NamedTuple):
     """The points of a source in a scene.
 
     Attributes:
-        surface: on which, or in the volume of which, particles are born.
-        number: of that surface in the scene; None if it is not a surface of the scene.
-        volume: whether they are born in its volume.
+        surface: births are on it, or in its volume.
+        number: its number in the scene; None if it is not a surface of the scene.
+        volume: whether births are in its volume.
         only: the surfaces with births on their admissible sides.
-        walls: the surfaces of which it is made that births are on, each with the volumes in which they are not; none:
+        walls: the surfaces of its parts with births on them, each with the volumes without births; empty:
             on all of it.
     """
 
@@ -55,10 +55,10 @@ class SourcePlace(NamedTuple):
 
 
 def place_of(scene: Scene, source: Source, name: str) -> SourcePlace:
-    """The points of a source, as far as they are known without drawing any.
+    """Return the points of a source, as far as they are known without drawing any.
 
     Raises:
-        SceneError: there is no such surface, or it is not at rest, or comes and goes.
+        SceneError: there is no such surface, or it moves, or it comes and goes.
     """
     only = () if source.within is None else (_volume(source.within),)
     where = source.where
@@ -74,7 +74,7 @@ def place_of(scene: Scene, source: Source, name: str) -> SourcePlace:
             return _of_wall(scene, i, source.volume, only, name)
         if source.volume:
             continue
-        # What is given to a whole, or to a part of it, its surfaces have too.
+        # The surfaces of a whole inherit the openings of the whole and of its parts.
         opened = [one for one in surface.surfaces() if any(_is_opening(opening, where) for opening in one.openings)]
         if opened:
             found = _of_wall(scene, i, False, (*only, _volume(where)), name)
@@ -99,7 +99,7 @@ def _is_same(one: Any, other: Any) -> bool:
 
 
 def _is_opening(opening: Surface | Opening, where: Any) -> bool:
-    """Whether this opening, or the volume of this one through which particles escape, is the place of a source."""
+    """Whether this opening, or its volume through which particles escape, is the place of a source."""
     volume = opening.surface if isinstance(opening, Opening) and not opening.between else None
     return _is_same(opening, where) or (volume is not None and _is_same(volume, where))
 
@@ -112,7 +112,7 @@ def _of_wall(scene: Scene, i: int, volume: bool, only: tuple[Surface, ...], name
 
 
 def _holes(surface: Surface) -> tuple[Surface, ...]:
-    """The volumes in which a surface is open, but for those that open walls between rooms alone."""
+    """Return the volumes in which a surface is open, except those that only open walls between rooms."""
     return tuple(volume_of(one) for one in surface.openings if not getattr(one, "between", False))
 
 
@@ -131,7 +131,7 @@ def _require_at_rest(surface: Surface, name: str) -> None:
 
 
 def _bounds_of(surface: Surface) -> Region:
-    """The corners of a box that the admissible side of a surface is in."""
+    """Return the corners of a box around the admissible side of a surface."""
     return _arrays(surface.bounds())
 
 
@@ -145,12 +145,12 @@ def _common(one: Region, other: Region) -> Region:
 
 
 class PointBatches:
-    """The points of a source, drawn one batch after the other.
+    """The points of a source, drawn in batches.
 
     Args:
         scene: the vessel.
         place: the points of the source.
-        name: of the source, for errors.
+        name: the name of the source, for errors.
     """
 
     def __init__(self, scene: Scene, place: SourcePlace, name: str) -> None:
@@ -163,13 +163,13 @@ class PointBatches:
         self._samples: list[AreaSample] = []
         meshes = any(isinstance(one, Mesh) for one in (place.surface, *scene.surfaces))
         self._batch = _FEW if meshes else _BATCH
-        # Walls that move, or come and go, are looked at when a particle is born.
+        # Walls that move, or come and go, are checked when a particle is born.
         self._lasting = [i for i, one in enumerate(scene.surfaces) if not changes(one)]
         if not place.volume:
             self._samples = self._of_surface()
 
     def draw(self, random: Random, n: int) -> tuple[Floats, Floats]:
-        """So many points (3, n), and there the unit normals (3, n) out of the admissible side; in a volume they are 0.
+        """Return n points (3, n) and the unit normals (3, n) there, out of the admissible side; in a volume they are 0.
 
         Raises:
             SceneError: fewer than one in a million of the points tried are admissible.
@@ -204,7 +204,7 @@ class PointBatches:
         return f"{self._name}.where must be in the vessel{within}, got {self._place.surface!r:.200}"
 
     def _require_common_bounds(self) -> None:
-        """Raise a SceneError where bounds alone say that no point of the source is in the vessel."""
+        """Raise a SceneError if bounds alone show that no point of the source is in the vessel."""
         surface, low, high = self._place.surface, self._low, self._high
         slack, axes = NEAR * self._extent, self._axes_of_bounds()
         if (apart := low - high > slack)[axes].any():
@@ -222,17 +222,17 @@ class PointBatches:
             phi = surface.phi(np.array(list(itertools.product(*zip(low, high, strict=True)))).T)
             if not (phi.min() <= slack and phi.max() >= -slack) and len(axes) == len(self._scene.axes()):
                 raise SceneError(
-                    f"{self._beginning()}, which is {np.abs(phi).min():.6g} m or more away from where births can be; "
-                    "move it"
+                    f"{self._beginning()}, which is {np.abs(phi).min():.6g} m or more away from the places where "
+                    "births can be; move it"
                 )
 
     def _axes_of_bounds(self) -> list[int]:
-        """The axes along which bounds count: not where a solid may reach over the faces of a cell that repeats."""
+        """Return the axes along which bounds count: not where a solid may reach over the faces of a periodic cell."""
         period = self._scene.period or (None, None, None)
         return [axis for axis in self._scene.axes() if period[axis] is None]
 
     def _box(self) -> tuple[Floats, Floats]:
-        """The corners of a box of the vessel, as far as births are wanted in it."""
+        """Return the corners of a box around the part of the vessel in which births are wanted."""
         scene = self._scene
         at_rest = [one for one in scene.surfaces if not changes(one)]
         low, high = scene.bounds_of(at_rest)
@@ -246,7 +246,7 @@ class PointBatches:
         scene, surface = self._scene, self._place.surface
         bounds = self._low, self._high
         if scene.period is not None and surface.is_solid():
-            # It may reach over the faces.
+            # The surface may reach over the faces.
             bounds = np.full(3, -2.0 * self._extent), np.full(3, 2.0 * self._extent)
         try:
             samples = surface.area_samples(bounds, scene.across())
@@ -274,9 +274,9 @@ class PointBatches:
 
     def _surface(self, random: Random) -> Floats:
         surface, points = self._place.surface, points_of(self._samples, random, self._batch)
-        # Triangles are where they are drawn, and to look for the nearest of many is dear.
+        # Triangles are exact already, and the search for the nearest of many is expensive.
         if not isinstance(surface, Mesh):
-            # Not what another part cuts off
+            # Without points that another part cuts off
             points = points[:, np.abs(distances(surface, points)) <= NEAR * self._extent]
             points = self._on(surface, points)
             points = points[:, np.abs(distances(surface, points)) <= PUT_ON_SURFACE * self._extent]
@@ -291,7 +291,7 @@ class PointBatches:
         return np.concatenate([points, normals])[:, self._admits(points, PUT_ON_SURFACE * self._extent)]
 
     def _is_on_walls(self, points: Floats) -> NDArray[np.bool_]:
-        """Which points of the surface are on one of its walls that is not open there."""
+        """Return which points of the surface are on one of its walls that is not open there."""
         walls = self._place.walls
         found = np.full(points.shape[1], not walls)
         for surface, holes in walls:
@@ -304,14 +304,14 @@ class PointBatches:
         return found
 
     def _is_wall_once(self, surface: Surface, points: Floats, normals: Floats, random: Random) -> NDArray[np.bool_]:
-        """Which points of a union are on its walls, not where two parts touch, and each as often as if by one part."""
+        """Return which points of a union to keep: on its walls, not where parts touch, and as often as of one part."""
         beyond = self._gap(surface, points + _BESIDE * self._extent * normals) > 0.0
         parts = dict.fromkeys(surface.surfaces())
         near = [np.abs(distances(part, points)) <= PUT_ON_SURFACE * self._extent for part in parts]
         return np.asarray(beyond & (random.random(points.shape[1]) * np.sum(near, axis=0) < 1.0))
 
     def _on(self, surface: Surface, points: Floats) -> Floats:
-        """Points near a surface, moved onto it."""
+        """Move points near a surface onto it; return them."""
         for _ in range(_STEPS):
             slopes = surface.gradient(points)
             with np.errstate(all="ignore"):
@@ -325,7 +325,7 @@ class PointBatches:
         return wanted
 
     def _admits(self, points: Floats, distance: float) -> NDArray[np.bool_]:
-        """Which points are inside all walls that are at rest, to so much [m]."""
+        """Return which points are inside all walls at rest, to within `distance` [m]."""
         admitted = np.ones(points.shape[1], np.bool_)
         if points.shape[1] and self._lasting:
             outside = self._scene.outside(points, distance)
@@ -337,7 +337,7 @@ class PointBatches:
 
     @staticmethod
     def _gap(surface: Surface, points: Floats) -> Floats:
-        """Where phi is no number is no place."""
+        """Return the gaps, infinite where phi is NaN: such points are no places."""
         found = gaps_of((surface,), points, 0.0)[0]
         return np.asarray(np.where(np.isnan(found), np.inf, found))
 

@@ -30,7 +30,7 @@ def _beam(name: str, value: Any) -> checks.Vector:
 
 
 def _radius(name: str, value: Any) -> float | tuple[float, float]:
-    """One radius, or the bounds of many."""
+    """Return one radius, or the bounds of many."""
     if not isinstance(value, (list, tuple)):
         return checks.length(name, value)
     if len(value) != 2:
@@ -42,7 +42,7 @@ def _radius(name: str, value: Any) -> float | tuple[float, float]:
 
 
 def _spin(name: str, value: Any) -> float | checks.Vector:
-    """An angular speed, or an angular velocity."""
+    """Return an angular speed, or an angular velocity."""
     if isinstance(value, (list, tuple, np.ndarray)):
         return checks.vector(name, value)
     return checks.at_least(name, value, 0.0)
@@ -50,53 +50,54 @@ def _spin(name: str, value: Any) -> float | checks.Vector:
 
 @dataclass(frozen=True, repr=False)
 class Source(Validated):
-    """A source of particles that come during a run; `simulate(..., sources=[...])` has a list of them.
+    """A source of particles that come during a run; `simulate(..., sources=[...])` takes a list of them.
 
     All births are drawn before the run, from its seed, each source by itself: the same bits for any threads, blocks,
-    resumes and shards. The particles that come are numbered behind those of the start, in the order in which they come.
+    resumes and shards. Particles that come are numbered after those of the start, in the order in which they come.
 
-    Births are in the half-open interval from `start`, included, to `stop`, excluded, as walls are `present`: of two
-    sources of which one begins when the other stops, no birth is of both. A source does not end with the run: a
+    Births are in the half-open interval from `start`, included, to `stop`, excluded, as walls are `present`: if one
+    source begins when another stops, no birth belongs to both. A source does not end with the run: a
     frame has all births up to its time, and at it, so it does not depend on the end of the run. With a method of fixed
     steps particles come at the end of the step in which their birth falls.
 
     Args:
-        where: a surface of the scene, or its number: births on it, uniform in its area, into the vessel. Or one of the
-            openings of a surface, or of a part of it: births on the surface to which it was given, where that is open.
-            Or any other surface: births on it as far as it is in the vessel, to its admissible side.
+        where: a surface of the scene, or its number: births on it, uniform in its area, into the vessel. Or an
+            opening of a surface, or of a part of it: births on the surface that has it, where that is open.
+            Or any other surface: births on its part in the vessel, to its admissible side.
         volume: True: births uniform in the part of the vessel on the admissible side of `where`.
         within: a surface with births on its admissible side, so that a part of a wall is a source; None: everywhere.
         rate: births a second, a Poisson process from `start` to `stop`. Or
         times: the times of all births [s], from 0 s on, in any order. Or
-        count: alone so many births, at independent times uniform from `start` to `stop`; with `rate` the most of them.
+        count: without a rate, births at this number of independent times, uniform from `start` to `stop`; with one,
+            the most births.
         even: True: births of a `rate` are evenly spaced, the first one at `start`; one that would be at `stop` to
             round-off does not come.
-        start: when births of a rate or a count begin [s].
-        stop: when they end [s], not before `start`, and where both are the same a count comes then; None: a rate does
-            not end. A count without a rate needs it.
-        temperature: k_B T [J] of the gas that comes. From a surface it is effusive: the velocities are those of what
-            passes a hole in the wall of a vessel with that gas; from a volume they are Maxwellian. Or
-        speed: |v| of all [m/s]; from a surface in the directions of the cosine law, from a volume in any. Or
-        beam: the velocity of all, three numbers [m/s].
-        divergence: of a beam the half angle of a cone about it in which directions are uniform [rad], below pi; those
+        start: the time at which births of a rate or a count begin [s].
+        stop: the time at which they end [s], not before `start`; if both are equal a count comes then; None: a rate
+            does not end. A count without a rate needs it.
+        temperature: k_B T [J] of the gas that comes. From a surface it is effusive: the velocities are those of
+            particles that pass a hole in the wall of a vessel with that gas; from a volume they are Maxwellian. Or
+        speed: |v| of all particles [m/s]; from a surface in the directions of the cosine law, from a volume in any. Or
+        beam: the velocity of all particles, three numbers [m/s].
+        divergence: half angle of the cone about a beam in which directions are uniform [rad], below pi; directions
             into a wall on which particles are born do not occur.
-        mass: of each [kg]; None: 1 kg, of balls without a `radius` here that of the particles of the start.
+        mass: mass of each particle [kg]; None: 1 kg, for balls without a `radius` here that of those at the start.
         radius: of balls [m], one number, or (low, high): uniform between them; None: that of the particles of the
-            start, which must all have the same, or points. Births of balls overlap neither balls nor walls, each at up
+            start, which must all be equal, or points. Births of balls overlap neither balls nor walls, each at up
             to 16 random places. On a wall balls touch it with their surface, on another surface and in a volume their
-            centres are there, everywhere as far as the largest one fits.
+            centres are there, everywhere the largest ball fits.
         density: of balls [kg/m^3], in a plane [kg/m^2], in place of a mass.
         spin: of balls and bodies: the angular speed about random axes, or three numbers, the angular velocity [rad/s].
-        blocked: of balls and bodies, what becomes of a birth that finds no free place: "wait", it and those after it
+        blocked: of balls and bodies, the rule for a birth that finds no free place: "wait", it and those after it
             come when it finds one, tried again in the time that a ball needs for its radius, or where nothing moves
             when the next birth is due; "report", it never comes. Both count in the observable `blocked`.
 
-    In a run of bodies those that come are further copies of the body, turned at random; a birth has room where the ball
-    around the body has, about its centre of mass. Its mass is that of the body.
+    In a run of bodies further copies of the body come, turned at random; a birth has room if the ball
+    around the body has room, about its centre of mass. Its mass is that of the body.
 
     Raises:
-        SceneError: an argument is out of its range, or they do not go together. What does not go with the scene (a
-            source outside the vessel, on a wall that moves) is found when a run starts.
+        SceneError: an argument is out of its range, or arguments do not go together. Conflicts with the scene (a
+            source outside the vessel, on a wall that moves) are found when a run starts.
 
     >>> Source(0, rate=1e4, temperature=1.0)
     Source(where=0, rate=10000.0, temperature=1.0)
@@ -130,7 +131,7 @@ class Source(Validated):
             raise SceneError(f"a source needs one of mass and density, got {self.mass:g} kg and {self.density:g}")
 
     def __repr__(self) -> str:
-        """The call that makes it, omitting defaults."""
+        """Return the call that makes it, without defaults."""
         given = [f for f in fields(self) if f.default is MISSING or getattr(self, f.name) is not f.default]
         return f"Source({', '.join(f'{f.name}={_as_text(getattr(self, f.name))}' for f in given)})"
 
@@ -193,7 +194,7 @@ class Source(Validated):
             raise SceneError(f"divergence must go with a beam, got {self.divergence:g} without one; give beam=")
 
     def require_points(self, name: str) -> None:
-        """Raise a `SceneError` where it asks for what points do not have."""
+        """Raise a `SceneError` if points do not have one of its arguments."""
         given = {"density": self.density is None, "spin": self.spin == 0.0, "blocked": self.blocked == "wait"}
         if self.radius is None and (wrong := [key for key, is_left_out in given.items() if not is_left_out]):
             raise SceneError(
@@ -202,12 +203,12 @@ class Source(Validated):
             )
 
     def largest(self) -> float:
-        """The largest radius of its balls [m]; 0 of points."""
+        """Return the largest radius of its balls [m]; 0 for points."""
         return float(np.max(self.radius or 0.0))
 
 
 def checked_sources(name: str, value: Any) -> tuple[Source, ...]:
-    """The argument `sources` of a run, checked."""
+    """Return the argument `sources` of a run, checked."""
     if value is None:
         return ()
     given = (value,) if isinstance(value, Source) else checks.list_of(name, value, "swarm.Source")

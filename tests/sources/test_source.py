@@ -143,7 +143,7 @@ FAR = swarm.Sphere(0.1, (2.0, 0.0, 0.0))
         (SPHERE, swarm.Sphere(0.1, (2.0, 0.0, 0.0), side="outside"), {}, "from 1.9 to 2.1 m along x"),
         (SPHERE, swarm.Box((0.1, 0.1, 0.1), (0.0, 0.0, 3.0)), {}, "from 2.9 to 3.1 m along z"),
         (SPHERE, swarm.Spheres([(3.0, 0.0, 0.0), (4.0, 0.0, 0.0)], [0.1, 0.1]), {}, "from 2.9 to 4.1 m along x"),
-        (SPHERE, swarm.Plane((0.0, 0.0, 1.0), 3.0), {}, "which is 2.5 m or more away from where births can be"),
+        (SPHERE, swarm.Plane((0.0, 0.0, 1.0), 3.0), {}, "2.5 m or more away from the places where births can be"),
         (SPHERE, swarm.Plane((0.0, 0.0, -1.0), 3.0), {}, "which is 2.5 m or more away"),
         (SPHERE, swarm.Plane((0.0, 0.0, -1.0), -3.0), {"volume": True}, "are; move it"),
         (SPHERE, 0, {"within": FAR}, "and in within=, .* along x these two have nothing in common"),

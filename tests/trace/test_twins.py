@@ -1,10 +1,12 @@
 """What a helper is written in: closures, defaults, lambdas, cells of notebooks, files that were edited."""
 
+import ast
 import linecache
 import math
 import subprocess
 import sys
 import textwrap
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from compared import assert_the_same, bits, compiled_only, copied, defined, in_k
 import swarm
 from swarm.kernel.jit import inlined
 from swarm.kernel.trace import source
+from swarm.surfaces.time_of_impact import flights
 
 pytestmark = compiled_only
 NUMBERS = (0.0, -0.0, 0.5, -3.0, math.inf, math.nan)
@@ -193,6 +196,52 @@ def test_a_file_that_was_edited_is_compiled_as_it_was(tmp_path):
     from compared import by_numba
 
     assert by_numba(calls)(2.0) == 4.0
+
+
+FUNCTIONS = '''
+class Shape:
+    @decorated(
+        1.0,
+    )
+    def first(
+        self, a
+    ):
+        """Text."""
+        b = [
+            a,
+# A remark, which ends nothing.
+        ]
+
+        def inside(c): return c
+        return inside(b)
+
+    @property
+    def second(self): return 2
+    # The end
+
+def unusual(a):
+    text = """
+of a line that is indented no more"""
+    return a + \\
+0.0
+@decorated
+def last(a):
+    return a
+'''
+
+
+def test_a_function_is_parsed_without_the_rest_of_its_file():
+    """The same syntax, with the same places; where a line of a string looks like the end of a function, not at all."""
+    of_package = Path(flights.__file__).read_text()
+    for text, unusual in ((FUNCTIONS, ["unusual"]), (of_package, [])):
+        lines, failed = text.splitlines(keepends=True), []
+        for whole in source._definitions(text):
+            alone = source._definition_alone(lines, source._first_line(whole))
+            if alone is None:
+                failed.append(whole.name)
+            else:
+                assert ast.dump(alone, include_attributes=True) == ast.dump(whole, include_attributes=True)
+        assert failed == unusual
 
 
 def test_a_function_without_source():

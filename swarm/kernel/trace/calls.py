@@ -1,4 +1,4 @@
-"""Calls of a helper while it is traced: what is an operation of a kernel, and what is traced in its turn."""
+"""Calls of a helper while it is traced: operations of a kernel, and functions that are traced in their turn."""
 
 import builtins
 import functools
@@ -21,7 +21,7 @@ from .twins import twin_of
 from .values import UNDEFINED, TraceError, Value, has_value, kind_of, name_of, noted
 from .ways import are_alike, traced_select, unified
 
-# Functions that are operations of a kernel, see `noted`, by themselves where all that they are given is known.
+# Functions that are operations of a kernel, see `noted`; with known arguments only they are called themselves.
 OPERATIONS: set[Any] = {
     *(getattr(math, name) for name in (
         "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos", "cosh", "degrees", "erf",
@@ -32,7 +32,7 @@ OPERATIONS: set[Any] = {
     builtins.abs, builtins.bool, builtins.divmod, builtins.float, builtins.int, builtins.pow, builtins.round,
     *(function for function in vars(operator).values() if isinstance(function, python_types.BuiltinFunctionType)),
 }  # fmt: skip
-# Functions that only a kernel can do.
+# Functions that only a kernel can run.
 INTRINSIC: set[Any] = set()
 
 
@@ -42,7 +42,7 @@ def _cast(value: Any, kind: Any) -> Any:
 
 
 def _extreme(function: Any, farther: Any, *values: Any) -> Any:
-    """The least or the largest of some numbers, by Python's comparisons: a NaN does not take the place of another."""
+    """Return the least or the largest of some numbers, by Python's comparisons: NaN does not replace another number."""
     if not has_value(values):
         return function(*values)
     if len(values) == 1 and isinstance(values[0], Value):
@@ -56,7 +56,7 @@ def _extreme(function: Any, farther: Any, *values: Any) -> Any:
 
 
 def _extreme_of(farther: Any, values: Any) -> Any:
-    """Reduction of an array which is not empty."""
+    """Return the reduction of an array which is not empty."""
     found = values[0]
     for k in range(1, values.shape[0]):
         found = select(farther(values[k], found), values[k], found)
@@ -67,12 +67,12 @@ def _is_instance(value: Any, made: Any) -> bool:
     """Whether a value is of a class; a number of a kernel is no record."""
     classes = made if isinstance(made, tuple) else (made,)
     if isinstance(value, Value) and not all(isinstance(one, type) and issubclass(one, _RECORDS) for one in classes):
-        raise TraceError("it asks of which class a number is that is known in the kernel only")
+        raise TraceError("it asks for the class of a number that is known in the kernel only")
     return isinstance(value, made)
 
 
 _RECORDS = (tuple, type(None))
-# What is called in place of a function while it is traced.
+# The functions that are called in place of others while tracing.
 REPLACED: dict[Any, Callable[..., Any]] = {
     isinstance: _is_instance,
     is_alike: are_alike,
@@ -83,24 +83,24 @@ REPLACED: dict[Any, Callable[..., Any]] = {
     max: functools.partial(_extreme, max, operator.gt),
     min: functools.partial(_extreme, min, operator.lt),
 }
-# Of NumPy: `np.array`, `np.sum` and others that are no ufuncs.
+# NumPy's `np.array`, `np.sum` and others that are not ufuncs.
 _ARRAY_FUNCTION = type(np.sum)
 _IN_PLACE = (list, dict, set)
 
 
 def operation(function: Any, typed: Callable[..., Any], *kinds: Any) -> Any:
-    """A decorator of the instructions of a function for arguments of such types; `typed` is the type of its result."""
+    """Decorate the instructions of a function for arguments of such types; `typed` gives the type of its result."""
     OPERATIONS.add(function)
     type_callable(function)(lambda _context: typed)
     return lower_builtin(function, *kinds)
 
 
 def called(function: Any, /, *given: Any, **named: Any) -> Any:
-    """A call while a helper is traced."""
+    """Make a call while a helper is traced."""
     if isinstance(function, Kernel):
         function = function.py_func
     if isinstance(function, python_types.MethodType):
-        # Before it is looked up: a method of a record may be outlined.
+        # Before the lookup: a method of a record may be outlined.
         function, given = function.__func__, (function.__self__, *given)
     try:
         replaced, is_operation = REPLACED.get(function), function in OPERATIONS
@@ -126,17 +126,17 @@ def _refused(function: Any, error: Exception) -> None:
     raise error
 
 
-# Lets Numba compile a function in place of a trace; the bridge to Numba says how, see `helpers.py`.
+# Let Numba compile a function in place of a trace; the bridge to Numba sets this function, see `helpers.py`.
 leave: Callable[[Any, Exception], None] = _refused
 
 
 def _foreign(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
-    """A call of a function of the user's, which may do what cannot be traced."""
+    """Call a function of the user's, which may have operations that cannot be traced."""
     now = taken()
     mark = len(now)
     try:
         return traced(function, given, named)
-    except Exception as error:  # What Python says where a proxy is not what a function expects.
+    except Exception as error:  # Python's errors if a proxy is not the type that a function expects
         if named:
             raise
         del now[mark:]
@@ -161,7 +161,7 @@ def _operation(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> 
 
 
 def traced(function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
-    """The result of a Python function; its operations are noted."""
+    """Return the result of a Python function, with its operations noted."""
     frame = CallFrame(called)
     twin_of(function, frame)(*given, **named)
     return frame.result()

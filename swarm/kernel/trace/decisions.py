@@ -10,7 +10,7 @@ from .notes import Assign, Branch, Jump, Label, add
 from .values import UNDEFINED, TraceError, Value, has_value, is_defined, noted
 from .ways import merged
 
-# How a block of statements ends: at the next statement, or elsewhere.
+# The end of a block of statements: at the next statement, or elsewhere.
 NEXT, DONE = True, False
 
 Get = Callable[[], tuple[Any, ...]]
@@ -18,10 +18,10 @@ Put = Callable[[tuple[Any, ...]], None]
 
 
 class Decisions:
-    """The function that `twins.py` calls for `if`, `and`, `or`, `not`, `in` and `return` calls this.
+    """The methods that `twins.py` calls for `if`, `and`, `or`, `not`, `in` and `return`.
 
-    The statements inside of `if` and loops are functions of no arguments that return NEXT, or DONE where the end is not
-    reached; `get` and `put` are the variables that they assign.
+    The statements inside of `if` and loops are functions of no arguments that return NEXT, or DONE if their end is not
+    reached; `get` and `put` read and write the variables that they assign.
     """
 
     UNDEFINED = UNDEFINED
@@ -46,7 +46,7 @@ class Decisions:
         return DONE
 
     def result(self) -> Any:
-        """The value that the function returns."""
+        """Return the value that the function returns."""
         if not self._gives:
             return self._only
         return self._met(self._exit, self._gives)
@@ -65,7 +65,7 @@ class Decisions:
     # --- Decisions ---
 
     def test(self, value: Any) -> Any:
-        """A condition: True or False where Python knows it."""
+        """Return a condition: True or False if Python knows it."""
         if not isinstance(value, Value):
             return bool(value)
         return value if isinstance(value.kind, types.Boolean) else noted(bool, value)

@@ -1,4 +1,4 @@
-"""Parts of a kernel, helpers as functions of their own for some types of arguments, and their notes as instructions.
+"""Parts of a kernel: helpers as functions of their own for given types of arguments, and notes as instructions.
 
 Each operation is emitted by Numba's own lowering.
 """
@@ -23,7 +23,7 @@ _part_numbers = itertools.count()
 
 
 class FunctionPart:
-    """A function of a kernel: the notes of a helper, its arguments and its result, a number each."""
+    """A function of a kernel: the notes of a helper, its arguments and its result, and its number."""
 
     def __init__(self, name: str, inlined: bool) -> None:
         self.name, self.inlined, self.number = name, inlined, next(_part_numbers)
@@ -34,7 +34,7 @@ class FunctionPart:
         self.numbers: list[Value] = []
 
     def take(self, given: Any) -> Any:
-        """The same with an argument in the place of every number that is not a type of its own."""
+        """Return the given value with an argument in the place of every number that is not a type of its own."""
         if isinstance(given, tuple):
             return made_of(given, map(self.take, given))
         if not _is_argument(given):
@@ -49,7 +49,7 @@ class FunctionPart:
             raise TraceError("its result has values of several kinds")
 
     def called(self, given: Any) -> Any:
-        """Note a call of it; what it gives."""
+        """Note a call of the function; return its result."""
         note, numbers = add(PartCall(self, [one for one in leaves(given) if _is_argument(one)])), itertools.count()
 
         def again(result: Any) -> Any:
@@ -61,12 +61,12 @@ class FunctionPart:
 
 
 def _is_argument(given: Any) -> bool:
-    """Whether a part takes it as an argument: a whole number or a truth that is known makes another part."""
+    """Whether a part takes it as an argument: a known integer or boolean makes another part."""
     return isinstance(given, (Value, float, np.generic))
 
 
 def key_of(given: Any) -> Any:
-    """The key of a part of a helper: the types of its arguments, and what is known of them."""
+    """Return the key of a part of a helper: the types of its arguments, and their known values."""
     if isinstance(given, tuple):
         return (type(given), *map(key_of, given))
     return ("a number", kind_of(given)) if _is_argument(given) else (type(given), given)
@@ -76,14 +76,14 @@ def key_of(given: Any) -> Any:
 
 
 def emit(context: Any, builder: Any, part: FunctionPart, given: Any) -> Any:
-    """The result of a part that is written out where the builder is."""
+    """Return the result of a part that is written out where the builder is."""
     writer = _Emission(context, builder, dict(zip(part.arguments, given, strict=True)))
     writer.emit(part.notes)
     return writer.value(part.result)
 
 
 class _Emission:
-    """The state of an emission: the values and the places that are known here."""
+    """The state of an emission: the values and the places that are known at this point."""
 
     def __init__(self, context: Any, builder: Any, values: dict[Any, Any]) -> None:
         self._context, self._builder, self._values = context, builder, values
@@ -95,7 +95,7 @@ class _Emission:
         self._functions: dict[Any, Any] = {}
 
     def emit(self, notes: list[Any]) -> None:
-        """Emit notes in their order; what is behind the end of a way is left out."""
+        """Emit notes in order; skip those behind the end of a way."""
         for note in notes:
             if isinstance(note, Label):
                 self._enter(note)
@@ -103,7 +103,7 @@ class _Emission:
                 self._WAYS[type(note)](self, note)
 
     def value(self, given: Any) -> Any:
-        """The value in LLVM of a constant, a proxy, or a record of them."""
+        """Return the value in LLVM of a constant, a proxy, or a record of them."""
         if isinstance(given, Value):
             return self._part(given.note, given.path)
         if given is None:
@@ -118,7 +118,7 @@ class _Emission:
         return self._context.get_constant_generic(self._builder, kind, constant)
 
     def cast(self, given: Any, kind: Any) -> Any:
-        """The same as another type."""
+        """Return a value as another type."""
         have = kind_of(given)
         return self.value(given) if have == kind else self._context.cast(self._builder, self.value(given), have, kind)
 
@@ -142,7 +142,7 @@ class _Emission:
         if not self._builder.block.is_terminated:
             self._builder.branch(block)
         self._builder.position_at_end(block)
-        # A part that was taken from a tuple on one way is not known on another.
+        # A part that was taken from a tuple on one way is not known on another way.
         self._parts = {}
 
     def _block(self, label: Label) -> Any:
@@ -167,7 +167,7 @@ class _Emission:
             fixed = len(kinds) - 1
             given = (*given[:fixed], given[fixed:])
         values = [self.cast(*pair) for pair in zip(given, kinds, strict=False)]
-        # Arguments that have defaults
+        # Arguments with defaults
         rest = kinds[len(values) :]
         values += [self._context.get_constant_generic(self._builder, kind, kind.value) for kind in rest]
         self._values[note] = self._functions[key](self._builder, values)
@@ -185,7 +185,7 @@ class _Emission:
             store_item(self._context, self._builder, kind, self.cast(note.value, kind.dtype), place)
 
     def _address(self, array: Value, place: tuple[Any, ...]) -> Any:
-        """The address of an element. A negative index counts from the end, as in Numba."""
+        """Return the address of an element. A negative index counts from the end, as in Numba."""
         builder, model = self._builder, default_manager[array.kind]
 
         def field(name: str, *path: int) -> Any:
@@ -251,9 +251,9 @@ class _Emission:
 
 
 def _of_numbers(context: Any, symbol: Any, found: Any) -> Any:
-    """What emits a universal function of numbers, or None.
+    """Return the emitter of a universal function of numbers, or None.
 
-    Numba writes a loop of one round around it, with variables for what it takes and gives: a third of all instructions
+    Numba writes a loop of one round around it, with variables for arguments and results: a third of all instructions
     for grains in a silo, and a quarter of the time to compile them.
     """
     ufunc = getattr(symbol, "typing_key", None)
@@ -275,10 +275,10 @@ def _of_numbers(context: Any, symbol: Any, found: Any) -> Any:
 
 
 def _function_of(context: Any, module: Any, part: FunctionPart) -> tuple[Any, Any]:
-    """The function of a part in a module, and the type of what it gives.
+    """Return the function of a part in a module, and the type of its result.
 
-    It takes the places of its result and of an error first, as Numba's functions do: what Numba compiled may be called
-    in it.
+    Its first arguments are the places of its result and of an error, as in Numba's functions, so that it may call
+    functions compiled by Numba.
     """
     name = f"traced.{part.name}.{part.number}"
     result = ir.LiteralStructType([context.get_value_type(one.kind) for one in part.numbers])

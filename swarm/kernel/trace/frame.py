@@ -11,7 +11,7 @@ from .notes import Assign, Branch, Label, Slot, add, taken
 from .values import TraceError, Value, has_value, kind_of, noted
 from .ways import all_of, carried, goes_round
 
-# Rounds of a loop that are written out where it cannot be a loop of the kernel.
+# The rounds of a loop that are written out if it cannot be a loop of the kernel.
 UNROLLED = 8
 
 
@@ -27,7 +27,7 @@ class _Loop:
 
 
 class CallFrame(Decisions):
-    """One call of a function while it is traced: what `twins.py` makes of its statements calls this."""
+    """One call of a function while it is traced; the statements that `twins.py` makes call this."""
 
     def __init__(self, call: Callable[..., Any]) -> None:
         super().__init__(call)
@@ -54,7 +54,7 @@ class CallFrame(Decisions):
         return self._rounds(test, body, get, put, get)
 
     def each(self, values: Any, take: Callable[[Any], None], body: Callable[[], bool], get: Get, put: Put) -> bool:
-        """`for value in values: body()`; the values of a `range` may be known in the kernel only."""
+        """`for value in values: body()`; the values of a `range` may be known only in the kernel."""
         if isinstance(values, Value):
             whole = values
             return self.each(Range(whole.shape[0]), lambda k: take(whole[k]), body, get, put)
@@ -67,7 +67,7 @@ class CallFrame(Decisions):
             known = values.known()
             if known is None or len(known) > UNROLLED:
                 raise
-        # What is done in each round depends on its number.
+        # The statements of each round depend on its number.
         del taken()[mark:], self._gives[gives:], self._loops[loops:]
         self._depth = depth
         put(before)
@@ -104,7 +104,7 @@ class CallFrame(Decisions):
         for value in values:
             loop.head, loop.nexts = Label(), []
             take(value)
-            self._depth += 1  # a round before may have left the loop
+            self._depth += 1  # an earlier round may have left the loop
             reached = body()
             self._depth -= 1
             if loop.nexts:
@@ -153,7 +153,7 @@ class CallFrame(Decisions):
                 loop.nexts.append((self._ends_at(loop.head), values))
             if all_of(goes_round(before, slots, wider, assign, value, ()) for assign, value in loop.nexts):
                 break
-            # A variable changes its type in the loop: once more with that which holds both.
+            # A variable changes its type in the loop: trace it again with the type that holds both.
             del noted_so_far[mark:]
             del self._gives[gives:]
             put(before)
@@ -172,14 +172,14 @@ class CallFrame(Decisions):
 
 
 class Range:
-    """The `range` of a loop of which a bound may be known in the kernel only."""
+    """The `range` of a loop; its bounds may be known only in the kernel."""
 
     def __init__(self, *given: Any) -> None:
         start, stop, step = (0, *given, 1) if len(given) == 1 else (*given, 1)[:3]
         self._given = start, stop, step
 
     def known(self) -> range | None:
-        """Its value in Python."""
+        """Return it as a Python range, or None."""
         return None if has_value(self._given) else range(*map(int, self._given))
 
     def __iter__(self) -> Iterator[int]:
@@ -189,7 +189,7 @@ class Range:
         return iter(known)
 
     def numbers(self) -> tuple[Any, Any, Any]:
-        """Start, stop and step, of one type; the step is known."""
+        """Return start, stop and step, of one type; the step is known."""
         start, stop, step = self._given
         if isinstance(step, Value):
             raise TraceError("the step of a range must be known before the kernel runs")

@@ -1,4 +1,4 @@
-"""Helpers for Numba and for traces: each is traced into its kernel; what cannot be traced is compiled by Numba."""
+"""Helpers for Numba and for traces: each is traced into its kernel; Numba compiles those that cannot be traced."""
 
 import functools
 import inspect
@@ -22,7 +22,7 @@ from .notes import Argument, context, noting, taken
 
 _LOG = logging.getLogger("swarm.trace")
 _HERE = Path(__file__).parent
-# Why helpers are compiled by Numba, by their modules and names.
+# The reasons for which Numba compiles helpers, by their modules and names.
 left_to_numba: dict[str, str] = {}
 
 
@@ -30,9 +30,9 @@ class Helper:
     """A function for kernels.
 
     Args:
-        function: what Python calls.
-        body: what kernels call.
-        outlined: a function of its own in a kernel, called and not inlined.
+        function: the function that Python calls.
+        body: the function that kernels call.
+        outlined: whether it is a function of its own in a kernel, called and not inlined.
     """
 
     def __init__(self, function: Any, body: Any, outlined: bool) -> None:
@@ -46,7 +46,7 @@ class Helper:
         self.errors: dict[Any, Exception] = {}
 
     def called(self, *given: Any, **named: Any) -> Any:
-        """The result of a call of it, in a trace."""
+        """Return the result of a call of the helper in a trace."""
         if named or len(given) < len(self.signature.parameters):
             bound = self.signature.bind(*given, **named)
             bound.apply_defaults()
@@ -57,7 +57,7 @@ class Helper:
         return values.noted(self._function, *given) if part is None else part.called(given)
 
     def whole(self, context: Any, kinds: tuple[Any, ...]) -> FunctionPart | None:
-        """It as Numba calls it, for arguments of these types, or None where it cannot be traced."""
+        """Return the helper as Numba calls it, for arguments of these types, or None if it cannot be traced."""
         if kinds not in self._whole:
             self._whole[kinds] = None
             part = FunctionPart(self.name, inlined=True)
@@ -74,17 +74,17 @@ class Helper:
                         part.result = self._run(given)
                     part.kind = values.kind_of(part.result)
                     self._whole[kinds] = part
-                except Exception as error:  # What Python says where a proxy is not what a function expects.
+                except Exception as error:  # Python's errors if a proxy is not the type that a function expects
                     self.errors[kinds] = error
                     _tell(self._function, error)
         return self._whole[kinds]
 
     def known(self, kinds: tuple[Any, ...]) -> FunctionPart | None:
-        """The result of `whole`."""
+        """Return the result of `whole`."""
         return self._whole.get(kinds)
 
     def _part(self, given: Any) -> FunctionPart | None:
-        """It as a part for such arguments, or None where it cannot be traced."""
+        """Return the helper as a part for such arguments, or None if it cannot be traced."""
         key = key_of(given)
         if key not in self._parts:
             self._parts[key] = None
@@ -93,7 +93,7 @@ class Helper:
                 try:
                     part.give(self._run(part.take(given)))
                     self._parts[key] = part
-                except Exception as error:  # What Python says where a proxy is not what a function expects.
+                except Exception as error:  # Python's errors if a proxy is not the type that a function expects
                     _tell(self._function, error)
         return self._parts[key]
 
@@ -102,7 +102,7 @@ class Helper:
         mark = len(notes)
         try:
             return self._run(given)
-        except Exception as error:  # What Python says where a proxy is not what a function expects.
+        except Exception as error:  # Python's errors if a proxy is not the type that a function expects
             del notes[mark:]
             _tell(self._function, error)
             return values.noted(self._function, *given)
@@ -114,7 +114,7 @@ class Helper:
 
 
 def _tell(function: Any, error: Exception) -> None:
-    """Keep why a function is left to Numba, and where: the line of the error, or where the function begins."""
+    """Keep why and where a function is left to Numba: the line of the error, or the first line of the function."""
     frames = [one for one in traceback.extract_tb(error.__traceback__) if Path(one.filename).parent != _HERE]
     code = inspect.unwrap(function).__code__
     places = [(code.co_filename, code.co_firstlineno), *((one.filename, one.lineno) for one in frames)]
@@ -124,7 +124,7 @@ def _tell(function: Any, error: Exception) -> None:
 
 
 def leaving(options: Any) -> Callable[[Any, Exception], None]:
-    """The way of a trace with a function of the user's that it cannot trace: Numba compiles it with these options."""
+    """Return the function with which a trace leaves a user's function to Numba, to be compiled with these options."""
 
     def leave(function: Any, error: Exception) -> None:
         _tell(function, error)
@@ -141,7 +141,7 @@ _LEFT: set[Any] = set()
 
 
 def prepare(function: Any, options: Any, outlined: bool, body: Any = None, is_kernel: bool = False) -> None:
-    """Let traces and Numba call a helper, or `body` in its place. Of a kernel Numba compiles no function by itself."""
+    """Let traces and Numba call a helper, or `body` in its place; as a kernel, Numba compiles no function by itself."""
     if is_disabled():
         return
     helper = Helper(function, body or function, outlined)
@@ -163,7 +163,7 @@ def prepare(function: Any, options: Any, outlined: bool, body: Any = None, is_ke
             try:
                 return super().generic(args, kws)
             except NumbaError as also:
-                # What it calls is no function of Numba's: why it cannot be traced says more.
+                # It calls a function that Numba does not know: the reason why it cannot be traced says more.
                 raise TypingError(str((error and error.__cause__) or error or also)) from also
 
         def get_impl_key(self, sig: Any) -> Any:
@@ -182,7 +182,7 @@ def prepare(function: Any, options: Any, outlined: bool, body: Any = None, is_ke
 
 
 def _definition(function: Any, body: Any) -> Any:
-    """The function that Numba compiles for the types of arguments."""
+    """Return the function that Numba compiles for the types of arguments."""
 
     @functools.wraps(function)
     def compiled(*kinds: Any, **named: Any) -> Any:

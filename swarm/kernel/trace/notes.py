@@ -1,4 +1,4 @@
-"""Notes of a helper: operations, and the ways through it."""
+"""The notes of a helper: its operations, and the ways through it."""
 
 import contextlib
 import threading
@@ -36,7 +36,7 @@ class Element:
 
 
 class Slot:
-    """A variable of a kernel, where several ways meet."""
+    """A variable of a kernel where several ways meet."""
 
     __slots__ = ("kind",)
 
@@ -45,7 +45,7 @@ class Slot:
 
 
 class Assign:
-    """Values for slots, at the end of a way; filled in when the others are known."""
+    """Values for slots at the end of a way; filled in when the other ways are known."""
 
     __slots__ = ("pairs",)
 
@@ -63,13 +63,13 @@ class Load:
 
 
 class Label:
-    """A place that a way can go to."""
+    """A place where a way can continue."""
 
     __slots__ = ()
 
 
 class Jump:
-    """The end of a way, which goes on at a label."""
+    """The end of a way, which continues at a label."""
 
     __slots__ = ("to",)
 
@@ -78,7 +78,7 @@ class Jump:
 
 
 class Branch:
-    """The end of a way, which goes on at one of two labels."""
+    """The end of a way, which continues at one of two labels."""
 
     __slots__ = ("condition", "first", "second")
 
@@ -111,11 +111,11 @@ _now = threading.local()
 
 @contextlib.contextmanager
 def noting(notes: list[Any], context: Any = None) -> Iterator[None]:
-    """Let a thread note what it traces; without a context that of the trace around it."""
+    """Let a thread note its trace; the default context is that of the trace around it."""
     before = getattr(_now, "notes", None), getattr(_now, "context", None)
     _now.notes, _now.context = notes, context or before[1]
     try:
-        # Of numbers that are known: kernels do not warn.
+        # For known numbers: kernels do not warn.
         with np.errstate(all="ignore"):
             yield
     finally:

@@ -8,7 +8,7 @@
                          if frame.branch(x > 0.0, then, other, get, put) is not frame.NEXT:
                              return False
 
-The twin has the globals and the cells of the function, so that names mean what they mean there, and its line numbers.
+The twin has the globals and the cells of the function, so that names keep their meaning, and its line numbers.
 """
 
 import ast
@@ -27,7 +27,7 @@ from .values import UNDEFINED, TraceError
 
 
 def twin_of(function: Any, frame: CallFrame) -> Callable[..., Any]:
-    """The twin of a function for one call of it.
+    """Return the twin of a function for one call of it.
 
     Raises:
         TraceError: its source is not known, or has a statement that no kernel has.
@@ -45,13 +45,13 @@ def _content(cell: Any) -> Any:
         return UNDEFINED
 
 
-# What a function may refer to: what may change later is not known when a kernel is compiled.
+# Values that a function may refer to: others may change after a kernel is compiled.
 _LASTING = (tuple, str, bytes, int, float, complex, type(None), range, np.generic, np.ndarray, types.ModuleType)
 
 
 @functools.cache
 def _maker(function: Any) -> Any:
-    """The function (frame, cells) that gives the twin."""
+    """Return the function (frame, cells) that makes the twin."""
     factory = _factory(function.__code__)
     if factory is None:
         raise TraceError(f"the source of {function.__name__} is not known")
@@ -66,7 +66,7 @@ _factories: dict[types.CodeType, types.CodeType | str | None] = {}
 
 
 def _factory(code: types.CodeType) -> types.CodeType | None:
-    """The code of a function (frame, cells) that gives the twin."""
+    """Return the code of a function (frame, cells) that makes the twin."""
     if code not in _factories:
         node = node_of(code)
         try:
@@ -83,7 +83,7 @@ def _factory(code: types.CodeType) -> types.CodeType | None:
 
 
 def _assigned(statements: Any) -> list[str]:
-    """The names that statements assign, in their order."""
+    """Return the names that statements assign, in order."""
     names: dict[str, None] = {}
     for one in statements:
         if isinstance(one, ast.FunctionDef):
@@ -96,7 +96,7 @@ def _assigned(statements: Any) -> list[str]:
 
 
 def _names(target: Any) -> Iterator[str]:
-    """The variables in what is assigned to."""
+    """Yield the variables in the target of an assignment."""
     if isinstance(target, ast.Name):
         yield target.id
     elif isinstance(target, (ast.Tuple, ast.Starred)):
@@ -115,22 +115,22 @@ _REFUSED = (
 
 
 def load(name: str) -> ast.Name:
-    """A variable."""
+    """Return a variable."""
     return ast.Name(name, ast.Load())
 
 
 def of_frame(name: str, *given: ast.expr) -> ast.Call:
-    """A call of a method of the frame."""
+    """Return a call of a method of the frame."""
     return ast.Call(ast.Attribute(load(FRAME), name, ast.Load()), list(given), [])
 
 
 def without_arguments(body: Any) -> ast.Lambda:
-    """An expression as a function."""
+    """Return an expression as a function."""
     return ast.Lambda(arguments(), body)
 
 
 class _TwinWriter(ast.NodeTransformer):
-    """Writes the twin of one function."""
+    """The writer of the twin of one function."""
 
     def __init__(self, node: Any, code: types.CodeType) -> None:
         self._node, self._code = node, code
@@ -138,7 +138,7 @@ class _TwinWriter(ast.NodeTransformer):
         self._locals = {*code.co_varnames, *code.co_cellvars}
 
     def written(self) -> Any:
-        """The twin."""
+        """Return the twin."""
         node = self._node
         parameters = node.args
         names = {one.arg for one in [*parameters.posonlyargs, *parameters.args, *parameters.kwonlyargs]}
@@ -160,7 +160,7 @@ class _TwinWriter(ast.NodeTransformer):
         return TraceError(f"{code.co_name} has {what}, {code.co_filename}, line {node.lineno}")
 
     def visit(self, node: Any) -> Any:
-        """The node of the twin for a node."""
+        """Return the node of the twin for a node."""
         if isinstance(node, _REFUSED) or (isinstance(node, ast.stmt) and not isinstance(node, _STATEMENTS)):
             raise self._refused(node, f"`{type(node).__name__.lower()}`")
         return super().visit(node)
@@ -168,7 +168,7 @@ class _TwinWriter(ast.NodeTransformer):
     # --- Statements ---
 
     def _block(self, statements: Any, last: bool = False) -> list[Any]:
-        """Statements; those that nothing reaches are left out."""
+        """Return statements without unreachable ones."""
         made: list[Any] = []
         for statement in statements:
             written = self.visit(statement)
@@ -181,7 +181,7 @@ class _TwinWriter(ast.NodeTransformer):
         return made
 
     def _as_function(self, name: str, statements: Any) -> ast.FunctionDef:
-        """A block of statements as a function."""
+        """Return a block of statements as a function."""
         names = [one for one in _assigned(statements) if one in self._locals]
         body = self._block(statements)
         body.append(ast.Return(ast.Attribute(load(FRAME), "NEXT", ast.Load())))
@@ -190,7 +190,7 @@ class _TwinWriter(ast.NodeTransformer):
         return definition(name, arguments(), body)
 
     def _variables(self, number: int, names: list[str]) -> list[Any]:
-        """The functions that get and put variables."""
+        """Return the functions that get and put variables."""
         values = ast.Tuple([load(name) for name in names], ast.Load())
         get = definition(f".get{number}", arguments(), [ast.Return(values)])
         body: list[Any] = [ast.Pass()]
@@ -200,7 +200,7 @@ class _TwinWriter(ast.NodeTransformer):
         return [get, definition(f".put{number}", arguments(".values"), body)]
 
     def _goes_on(self, call: ast.expr) -> ast.If:
-        """The statements that are reached only where the call says so."""
+        """Return the test that goes on to the following statements only if the call returns NEXT."""
         test = ast.Compare(call, [ast.IsNot()], [ast.Attribute(load(FRAME), "NEXT", ast.Load())])
         return ast.If(test, [ast.Return(ast.Constant(False))], [])
 
@@ -260,7 +260,7 @@ class _TwinWriter(ast.NodeTransformer):
         given = [self.visit(one) for one in node.args]
         named = [ast.keyword(one.arg, self.visit(one.value)) for one in node.keywords]
         if isinstance(node.func, ast.Name) and node.func.id == "super" and not given:
-            # Python finds both by itself, but not in the blocks of a twin.
+            # Python finds both arguments by itself, but not in the blocks of a twin.
             given = [load("__class__"), load(self._code.co_varnames[0])]
         made = of_frame("call", self.visit(node.func), *given)
         made.keywords = named
@@ -297,14 +297,14 @@ class _TwinWriter(ast.NodeTransformer):
             found = of_frame("negate", found) if isinstance(asked, (ast.NotIn, ast.IsNot)) else found
             return ast.copy_location(found, node)
         terms = [node.left, *node.comparators]
-        # Of a term that stands in two comparisons each has its own.
+        # A term in two comparisons needs a copy for each.
         pairs = zip(terms, node.ops, map(copy.deepcopy, terms[1:]), strict=False)
         return self.visit(
             ast.copy_location(ast.BoolOp(ast.And(), [ast.Compare(a, [op], [b]) for a, op, b in pairs]), node)
         )
 
     def visit_Subscript(self, node: ast.Subscript) -> Any:
-        """An element."""
+        """Write an element through the frame."""
         if not isinstance(node.ctx, ast.Load):
             return self.generic_visit(node)
         return ast.copy_location(of_frame("item", self.visit(node.value), self._place(node.slice)), node)
@@ -320,5 +320,5 @@ class _TwinWriter(ast.NodeTransformer):
         return self.visit(node)
 
     def visit_Lambda(self, node: ast.Lambda) -> Any:
-        """A function, which is traced where it is called."""
+        """Keep a function, which is traced where it is called."""
         return node

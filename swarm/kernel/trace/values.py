@@ -1,4 +1,4 @@
-"""Proxies of what a kernel has: an operation on them is noted, and Numba says of what type its result is."""
+"""Proxies of the values of a kernel: an operation on them is noted, and Numba gives the type of its result."""
 
 import functools
 import operator
@@ -15,11 +15,11 @@ from .notes import Attribute, Call, Element, add, context
 
 
 class TraceError(Exception):
-    """A helper does what has no notes; the text says what."""
+    """A helper has an operation without notes; the text names it."""
 
 
 class Value:
-    """A number or an array of a kernel that is being traced: of a note, the part of its value at a path."""
+    """A number or an array of a kernel that is being traced: the part at a path of the value of a note."""
 
     __slots__ = ("kind", "note", "path")
     __hash__ = None  # type: ignore[assignment]
@@ -47,7 +47,7 @@ class Value:
 
     def __getattr__(self, name: str) -> Any:
         if name in _FIELDS and isinstance(self.kind, types.Array):
-            # A part of what an array is in a kernel: there is nothing to note.
+            # A part of the representation of an array in a kernel: there is nothing to note.
             number = _ARRAY.get_field_position(_FIELDS[name])
             kind: Any = types.UniTuple(types.intp, self.kind.ndim) if name in ("shape", "strides") else types.intp
             return opened(kind, self.note, (*self.path, number))
@@ -82,12 +82,12 @@ def _is_index(place: Any) -> bool:
 
 
 def _method(of: Value, kind: Any, *given: Any) -> Any:
-    """Note the call of a method of an array."""
+    """Note the call of a method of an array; return its result."""
     return _result(Call(kind, _signature(kind, kind, tuple(map(kind_of, given))), (of, *given)))
 
 
 class Real(Value):
-    """A floating-point number: helpers are chosen by its class."""
+    """A floating-point number: helpers are chosen by this class."""
 
     __slots__ = ()
 
@@ -99,7 +99,7 @@ _ARRAY = default_manager[types.Array(types.float64, 1, "C")]
 
 
 def _product(base: Any, exponent: int) -> Any:
-    """The power by a whole number, in the order in which Numba multiplies."""
+    """Return a power with an integer exponent, in the order in which Numba multiplies."""
     result, factor = 1.0 if isinstance(base.kind, types.Float) else 1, base
     while exponent:
         if exponent & 1:
@@ -149,12 +149,12 @@ UNDEFINED = _Undefined()
 
 
 def is_number(value: Any) -> bool:
-    """Whether it is a number of a kernel, known or not: what a slot can hold."""
+    """Whether a value is a number of a kernel, known or not, which a slot can hold."""
     return isinstance(value, (Value, bool, int, float, np.generic))
 
 
 def has_value(given: Any) -> bool:
-    """Whether there is a proxy in it."""
+    """Whether it contains a proxy."""
     if isinstance(given, (tuple, list)):
         return any(map(has_value, given))
     if isinstance(given, slice):
@@ -163,7 +163,7 @@ def has_value(given: Any) -> bool:
 
 
 def kind_of(value: Any) -> Any:
-    """The type in a kernel of a constant, a proxy, or a record of them."""
+    """Return the type in a kernel of a constant, a proxy, or a record of them."""
     if isinstance(value, Value):
         return value.kind
     if value is None:
@@ -188,24 +188,24 @@ def kind_of(value: Any) -> Any:
 
 
 def is_defined(value: Any) -> bool:
-    """Whether every part of it has one value."""
+    """Whether every part of a value has one value."""
     if isinstance(value, tuple):
         return all(map(is_defined, value))
     return not isinstance(value, _Undefined)
 
 
 def leaves(value: Any) -> list[Any]:
-    """The parts of a record, in its order."""
+    """Return the parts of a record, in order."""
     return [leaf for part in value for leaf in leaves(part)] if isinstance(value, tuple) else [value]
 
 
 def made_of(value: Any, parts: Iterable[Any]) -> Any:
-    """A tuple of the class of another."""
+    """Return a tuple of the class of another."""
     return tuple(parts) if type(value) is tuple else tuple.__new__(type(value), parts)
 
 
 def opened(kind: Any, note: Any, path: tuple[int, ...] = ()) -> Any:
-    """A value of a kernel as a record of proxies."""
+    """Return a value of a kernel as a record of proxies."""
     if isinstance(kind, types.NoneType):
         return None
     if isinstance(kind, types.BaseTuple):
@@ -225,7 +225,7 @@ _signatures: dict[Any, tuple[Any, Any]] = {}
 
 
 def noted(symbol: Any, *given: Any) -> Any:
-    """Note an operation that Numba knows; its result as proxies."""
+    """Note an operation that Numba knows; return its result as proxies."""
     given = tuple(map(_sliced, given))
     key = symbol, tuple(map(kind_of, given))
     if key not in _signatures:
@@ -252,7 +252,7 @@ def _result(note: Call) -> Any:
 
 
 def _sliced(given: Any) -> Any:
-    """Slices as values of a kernel."""
+    """Return slices as values of a kernel."""
     if isinstance(given, slice):
         parts = (given.start, given.stop) if given.step is None else (given.start, given.stop, given.step)
         return noted(slice, *parts)
@@ -262,5 +262,5 @@ def _sliced(given: Any) -> Any:
 
 
 def name_of(symbol: Any) -> str:
-    """The name of an operation, for a sentence."""
+    """Return the name of an operation, for a message."""
     return getattr(symbol, "__name__", str(symbol))

@@ -1,4 +1,4 @@
-"""One value for several: of a variable where the ways through a helper meet, and of `select`, without a branch."""
+"""One value from several: for a variable where the ways through a helper meet, and for `select`, without a branch."""
 
 import math
 from collections.abc import Iterable
@@ -30,12 +30,12 @@ def _is_same(a: Any, b: Any) -> bool:
 
 
 def all_of(answers: Iterable[bool]) -> bool:
-    """Whether all are true; all of them are asked."""
+    """Whether all are true; all of them are evaluated."""
     return all(list(answers))
 
 
 def unified(kinds: list[Any]) -> Any:
-    """The type that holds values of all these."""
+    """Return the type that holds values of all these types."""
     kind = kinds[0] if all(k == kinds[0] for k in kinds) else context().unify_types(*kinds)
     if kind is None or isinstance(kind, types.Optional):
         raise TraceError(f"a variable is {' or '.join(map(str, kinds))}")
@@ -43,7 +43,7 @@ def unified(kinds: list[Any]) -> Any:
 
 
 def merged(ways: list[tuple[Assign, Any]]) -> Any:
-    """One value for several, each known on its way."""
+    """Return one value for several, each known on its way."""
     first = ways[0][1]
     if all(_is_same(value, first) for _, value in ways):
         return first
@@ -60,7 +60,7 @@ def merged(ways: list[tuple[Assign, Any]]) -> Any:
 
 
 def carried(value: Any, entry: Assign, slots: Any, wider: Any, path: tuple[int, ...]) -> Any:
-    """The variables of a loop at the start of a round: every number is in a slot."""
+    """Return the variables of a loop at the start of a round, with every number in a slot."""
     if isinstance(value, tuple):
         return made_of(value, [carried(one, entry, slots, wider, (*path, k)) for k, one in enumerate(value)])
     if not is_number(value):
@@ -71,9 +71,9 @@ def carried(value: Any, entry: Assign, slots: Any, wider: Any, path: tuple[int, 
 
 
 def goes_round(before: Any, slots: Any, wider: Any, assign: Assign, value: Any, path: tuple[int, ...]) -> bool:
-    """Put the variables at the end of a round into their slots; whether the types of these hold them."""
+    """Put the variables at the end of a round into their slots; return whether the types of the slots hold them."""
     if before is UNDEFINED:
-        return True  # a round does not see what an earlier one has left in it
+        return True  # a round does not use the value that an earlier one has left
     if isinstance(before, tuple) and type(value) is type(before) and len(value) == len(before):
         pairs = enumerate(zip(before, value, strict=True))
         return all_of(goes_round(old, slots, wider, assign, new, (*path, k)) for k, (old, new) in pairs)
@@ -81,7 +81,7 @@ def goes_round(before: Any, slots: Any, wider: Any, assign: Assign, value: Any, 
     if slot is None and _is_same(before, value):
         return True
     if slot is None or not is_number(value):
-        raise TraceError("a variable of a loop is something else in the first round than later")
+        raise TraceError("a variable of a loop has another type in the first round than later")
     assign.pairs.append((slot, value))
     kind = unified([slot.kind, kind_of(value)])
     if kind == slot.kind:
@@ -94,7 +94,7 @@ def goes_round(before: Any, slots: Any, wider: Any, assign: Assign, value: Any, 
 
 
 def traced_select(condition: Any, first: Any, second: Any) -> Any:
-    """`select` in a trace: of records part by part."""
+    """Return `select` in a trace, part by part for records."""
     if not has_value((condition, first, second)):
         return first if condition else second
     if isinstance(first, tuple):
@@ -103,7 +103,7 @@ def traced_select(condition: Any, first: Any, second: Any) -> Any:
 
 
 def are_alike(one: Any, other: Any) -> bool:
-    """`is_alike` in a trace."""
+    """Return `is_alike` in a trace."""
     if isinstance(one, tuple):
         same = type(one) is type(other) and len(one) == len(other)
         return same and all(map(are_alike, one, other))

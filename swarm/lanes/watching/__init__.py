@@ -1,1 +1,1 @@
-"""What is counted and logged of particles in lanes."""
+"""Counting and logging of particles in lanes."""

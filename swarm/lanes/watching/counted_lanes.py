@@ -11,7 +11,7 @@ from ...state import CROSSED
 from ...surfaces.counted import slowness
 from ..table import LaneView, Rows, marked_lanes
 
-# Lanes are counted one by one where fewer than one of so many cross a counter.
+# Lanes are counted one by one if fewer than one in this number crosses a counter.
 _FEW = 8
 
 _named = Rows()
@@ -24,7 +24,7 @@ class Began(LaneView):
 
 
 BEGAN = _named.count
-# Behind these rows are those of each counter: the side of the lane, 1 or -1, and what it has crossed in both senses.
+# Then follow the rows of each counter: the side of the lane, 1 or -1, and its crossings in both senses.
 _SENSE = 1 + CROSSED
 ROWS_OF_COUNTER = 1 + 2 * _SENSE
 
@@ -40,18 +40,18 @@ def row_of_counter(c):
 
 
 def row_of_sense(c, s):
-    """The first row of what has crossed it in a sense: how many, then the sums."""
+    """The first row of the crossings of a counter in a sense: their number, then the sums."""
     return row_of_counter(c) + 1 + _SENSE * s
 
 
 def count_in_lanes(one, c, gravity, lanes, live):
-    """Count the crossings of a counter by the flights of all lanes: the same as of each by itself."""
+    """Count the crossings of a counter by the flights of all lanes, with the result of a count of each by itself."""
     rounds = (True, False)[2 - one.most(gravity) :]
     if len(rounds) == 1 or gravity is not None:
         for i in range(index(live)):
             _count_in_lane(one, c, gravity, lanes, i, rounds)
         return
-    # Two rounds take three times as long as a test for a crossing. If few lanes cross, these are counted one by one.
+    # Two rounds take three times as long as a test for a crossing. If few lanes cross, they are counted one by one.
     for i in range(index(live)):
         lane, began = lanes.lane(i), Began(lanes.began, i)
         time = one.crossing(lanes.began[row_of_counter(c), i], gravity, began.r, lane.v).time
@@ -80,7 +80,7 @@ def _count_in_lane(one, c, gravity, lanes, i, rounds):
             crosses if one.volumes is None else crosses & one.has(there),
             one.speed(sign, 0.0, there, w),
         )
-        # One of two crossings is out, and the other back.
+        # Of two crossings one is out, and the other back.
         out = _first_of(counts & (sign > 0.0), w, across, out)
         back = _first_of(counts & (sign < 0.0), w, across, back)
         if goes_on:

@@ -1,7 +1,7 @@
-"""Counters: flights in lanes, and steps of what slides, are looked at after they are done; they change no bit of these.
+"""Counters look at flights in lanes, and at steps of sliding particles, after they are done, and change no bit of them.
 
-Each particle has its side of each counter. A flight is looked at from that side, crosses where it leaves it, and is
-looked at from the other side from there on: so crossings out less those back are the change of the number outside,
+Each particle has a side of each counter. A flight is followed from this side, crosses where it leaves the side, and
+is then followed from the other side: so crossings out minus crossings back are the change of the number outside,
 exactly. A particle that ends a flight on a counter, within round-off, crosses it in the next flight, or not at all if
 it is turned round there. So a counter at the place of a wall counts no particle, and a counter at a face of a periodic
 cell counts each particle once.
@@ -51,7 +51,7 @@ class Counters(Record):
 
     each: Any  # `Counted` of each
     gravity: Any  # None where flights are straight
-    quiet: Any  # whether they stay within one cell, and no crossing is logged; else None
+    quiet: Any  # whether particles stay within one cell, and no crossing is logged; else None
 
     def rows(self):
         """The number of rows of a lane."""
@@ -64,7 +64,7 @@ class Counters(Record):
     # --- Flights in lanes ---
 
     def load(self, state, lanes, i, k):
-        """What is known of particle i into lane k."""
+        """Load the state of particle i into lane k."""
         Began(lanes.began, k).mass = state.mass[i]
         for c, one in enumerate(self.each):
             lanes.began[row_of_counter(c), k] = sign_of_side(state, c, i)
@@ -75,7 +75,7 @@ class Counters(Record):
                     lanes.began[first + 1 + j, k] = state.crossed.sums[CROSSED * (2 * c + s) + j, i]
 
     def retire(self, state, lanes, i, k):
-        """What lane k has crossed back into particle i."""
+        """Write the crossings of lane k back to particle i."""
         for c, one in enumerate(self.each):
             if self.is_in_lanes(one):
                 state.crossed.side[c, i] = 0 if lanes.began[row_of_counter(c), k] > 0.0 else 1
@@ -86,11 +86,11 @@ class Counters(Record):
                         state.crossed.sums[CROSSED * (2 * c + s) + j, i] = lanes.began[first + 1 + j, k]
 
     def move(self, lanes, source, target):
-        """A lane into another."""
+        """Move a lane to another."""
         copy_lane(lanes.began, source, lanes.began, target, self.rows())
 
     def keep_before(self, method, gravity, lanes, live):
-        """Keep every lane as it is before its flight, or its contact."""
+        """Keep the state of every lane before its flight, or its contact."""
         for i in range(index(live)):
             lane, began = lanes.lane(i), Began(lanes.began, i)
             began.r, began.remaining = lane.r, method.seconds(lane.remaining)
@@ -98,7 +98,7 @@ class Counters(Record):
                 began.v = lane.v
 
     def count_flights(self, method, gravity, share, lanes, live):
-        """Count what the flights of all lanes have crossed."""
+        """Count the crossings in the flights of all lanes."""
         marks = False
         for c, one in enumerate(self.each):
             if self.is_in_lanes(one):
@@ -109,7 +109,7 @@ class Counters(Record):
             self._look_at_lanes(method, gravity, share, lanes, live)
 
     def _look_at_lanes(self, method, gravity, share, lanes, live):
-        """The lanes that may cross a counter, one by one."""
+        """Look at the lanes that may cross a counter, one by one."""
         # A fall may leave a cell and come back into it.
         all_of_them = lanes.period is not None and gravity is not None
         for i in range(index(live)):
@@ -139,13 +139,13 @@ class Counters(Record):
                 lanes.began[row_of_counter(c), i] = sign_of_side(share.state, c, p)
 
     def look_at(self, gravity, share, p, flown):
-        """Count what a flight within one cell crosses, of the counters that are not counted in lanes."""
+        """Count the crossings in a flight within one cell, of the counters that are not counted in lanes."""
         for c, one in enumerate(self.each):
             if not self.is_in_lanes(one):
                 look_at_one(one, c, gravity, share, p, flown)
 
     def look_at_cells(self, period, gravity, share, p, flown):
-        """The same of a flight over faces, cell by cell: walls and counters are known in one."""
+        """Count the crossings in a flight over faces, cell by cell: walls and counters are known in one cell."""
         back, (gx, gy, gz) = into(period, flown.end), pulls(gravity)
         r, v, left, remaining, images = flown.r, flown.v, flown.time, flown.remaining, ZERO
         while True:
@@ -165,7 +165,7 @@ class Counters(Record):
             if not ends:
                 step = Vec(step_over(x <= time, after.x), step_over(y <= time, after.y), step_over(z <= time, after.z))
             elif not is_same(images, back.images):
-                # By round-off the flight has ended before a face, or after it.
+                # Round-off has ended the flight before a face, or after it.
                 step = back.images - images
             else:
                 return
@@ -185,7 +185,7 @@ class Counters(Record):
     # --- Steps, and ends ---
 
     def count_contact(self, method, share, lanes, i):
-        """Count what lane i has crossed in a contact that takes time, since `keep_before`."""
+        """Count the crossings of lane i in a contact that takes time, since `keep_before`."""
         lane, began, p = lanes.lane(i), Began(lanes.began, i), index(lanes.particle[i])
         found = False
         for c, one in enumerate(self.each):
@@ -198,7 +198,7 @@ class Counters(Record):
 
     @outlined
     def count_step(self, share, p, before, after):
-        """Count what a step of particle p has crossed, from one `ParticleMoment` to another, by its ends."""
+        """Count the crossings in a step of particle p between two `ParticleMoment`s, from its ends."""
         state = share.state
         for c, one in enumerate(self.each):
             d0, d1, sign = one.distance(before.r), one.distance(after.r), sign_of_side(state, c, p)
@@ -215,7 +215,7 @@ class Counters(Record):
                 book_crossing(one, c, share, p, there, across, ZERO)
 
     def come_back_lane(self, method, share, lanes, i, end):
-        """As `come_back`, of lane i, of which a contact since `keep_before` has left the cell at `end`."""
+        """Call `come_back` for lane i, of which a contact since `keep_before` has left the cell at `end`."""
         lane, began, p = lanes.lane(i), Began(lanes.began, i), index(lanes.particle[i])
         before = ParticleMoment(began.r, began.v, began.remaining)
         self.come_back(share, p, before, end, ParticleMoment(lane.r, lane.v, method.seconds(lane.remaining)))
@@ -224,7 +224,7 @@ class Counters(Record):
 
     @outlined
     def come_back(self, share, p, before, end, after):
-        """The sides of particle p: its step has left the cell at `end`, and it is back in the cell `after`."""
+        """Set the sides of particle p when its step has left the cell at `end` and it is back in the cell `after`."""
         state = share.state
         start = before._replace(r=before.r + (after.r - end))
         for c, one in enumerate(self.each):
@@ -235,7 +235,7 @@ class Counters(Record):
 
     @outlined
     def settle(self, share, p, there):
-        """Count particle p, a `ParticleMoment`, at a counter, if it goes on from there without another look."""
+        """Count a crossing of particle p, a `ParticleMoment` at a counter, if it goes on without another look."""
         self._settle_all(share, p, there, ZERO)
 
     def _settle_all(self, share, p, there, images):

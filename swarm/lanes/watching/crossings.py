@@ -1,4 +1,4 @@
-"""What one particle crosses of one counter, by a flight and at a face of a cell that repeats."""
+"""The crossings of one particle and one counter, in a flight and at a face of a periodic cell."""
 
 import math
 from typing import Any
@@ -13,21 +13,21 @@ from ...state import CROSSED
 from ...surfaces.counted import slowness
 from ...surfaces.periodic.axes import length_of, time_out
 
-# The most crossings of one counter, and ends of what is surely free, in one flight through one cell; a guard alone.
+# The most crossings of one counter, and ends of free parts, in one flight through one cell: only a guard.
 _MOST = 100_000
-# A place ahead, in distances that are round-off, that tells on which side of a counter a particle on it goes.
+# The distance to a place ahead, in multiples of round-off, that decides on which side a particle on a counter goes.
 AHEAD = 1e3
 
 
 class Flown(Record):
-    """A flight within one cell: its start, how long it is, what is left of the frame at its start, and its end."""
+    """A flight within one cell: its start, its duration, the time left of the frame at its start, and its end."""
 
     r: Vec
     v: Vec
     time: Any
     remaining: Any
     end: Vec
-    images: Vec  # of the cell, from that where the particle is booked
+    images: Vec  # the cell, relative to that where the particle is booked
 
 
 @outlined
@@ -55,7 +55,7 @@ def look_at_one(one, c, gravity, share, p, flown):
 
 @outlined
 def book_crossing(one, c, share, p, there, across, images):
-    """Particle p, a `ParticleMoment`, crosses counter c with a speed across it."""
+    """Book that particle p, a `ParticleMoment`, crosses counter c with a speed across it."""
     crossed, m = share.state.crossed, share.state.mass[p]
     sense = int(crossed.side[c, p])
     crossed.side[c, p] = 1 - sense
@@ -75,19 +75,19 @@ def book_crossing(one, c, share, p, there, across, images):
 
 
 def sign_of_side(state, c, p):
-    """1.0 of a particle that is on the admissible side of a counter, -1.0 of one on the other."""
+    """1.0 for a particle on the admissible side of a counter, -1.0 for one on the other side."""
     return 1.0 - 2.0 * state.crossed.side[c, p]
 
 
 def distances_ahead(one, r, v):
-    """The distances out of a counter here and a little ahead."""
+    """Return the distances to a counter, positive outside, here and a little ahead."""
     speed = norm(v)
     step = AHEAD * one.near / speed if speed > 0.0 else 0.0
     return one.distance(r), one.distance(r + step * v)
 
 
 def come_into_cell(one, c, state, p, r, v):
-    """The side of a particle that comes into a cell: at a counter at its face that from which it comes."""
+    """Set the side of a particle that enters a cell; at a counter on the face, the side from which it comes."""
     d, ahead = distances_ahead(one, r, v)
     if abs(d) > one.near:
         state.crossed.side[c, p] = 0 if d < 0.0 else 1
@@ -99,22 +99,22 @@ def come_into_cell(one, c, state, p, r, v):
 
 
 def time_of_face(pull, length, x, v):
-    """When a coordinate leaves [0, length]."""
+    """Return the time at which a coordinate leaves [0, length]."""
     return math.inf if length is None else max(time_out(pull, (0.0, length_of(length)), x, v), 0.0)
 
 
 def step_over(leaves, v):
-    """The step to the next cell along an axis, of a particle that leaves through a face, else 0."""
+    """Return the step to the next cell along an axis for a particle that leaves through a face, else 0."""
     return select(leaves, select(v > 0.0, 1.0, -1.0), 0.0)
 
 
 def beyond_face(length, x, step):
-    """A coordinate in the next cell, at its face."""
+    """Return a coordinate in the next cell, at its face."""
     if step == 0.0:
         return x
     return 0.0 if step > 0.0 else length_of(length)
 
 
 def is_same(one, other):
-    """Whether two numbers of cells are the same."""
+    """Whether two cells are the same."""
     return total(absolute(one - other)) == 0.0

@@ -1,4 +1,4 @@
-"""The log of impacts: each one that a kernel counts is a row, in arrays that another thread writes to a file.
+"""The log of impacts: a row for each impact that a kernel counts, in arrays that another thread writes to a file.
 
 A run without a log has None in its place, and compiles none of this code.
 """
@@ -15,14 +15,14 @@ from ...kernel.vector import ZERO, Vec, dot
 from ..share import ThreadPlace
 from ..table import LANES, LaneView, Rows
 
-# What a kernel leaves that ends with a full log: particle, stop, draws, live lanes, passes.
+# The state that a kernel leaves when it ends with a full log: particle, stop, draws, live lanes, passes.
 GOING = 5
 
 _named = Rows()
 
 
 class BeforeContact(LaneView):
-    """A lane before its contact: its flight, the wall, and the impulse that this has given it since."""
+    """A lane before its contact: its flight, the wall, and the impulse of the wall since then."""
 
     r, v, remaining = _named.vector(), _named.vector(), _named.number()
     hits, wall, impulse = _named.number(), _named.number(), _named.number()
@@ -32,7 +32,7 @@ ROWS = _named.count
 
 
 class Lasted(Record):
-    """What is known of a contact that takes time."""
+    """The record of a contact that takes time."""
 
     duration: float  # [s]
     largest_force: float  # along the normal [N]
@@ -40,38 +40,38 @@ class Lasted(Record):
 
 
 class Struck(Record):
-    """An impact of a particle on a wall or on another particle, or its way through an opening."""
+    """An impact of a particle on a wall or on another particle, or its passage through an opening."""
 
     particle: Any
-    wall: Any  # -1 where it meets a particle, below that a counter
+    wall: Any  # -1 if it meets a particle, below -1 a counter
     time: float  # [s]
     r: Vec
-    before: Vec  # its velocities
-    after: Vec
+    before: Vec  # velocity before
+    after: Vec  # velocity after
     impulse: float  # along the normal [N s]
-    slip: Vec = ZERO  # relative to the wall, before
+    slip: Vec = ZERO  # relative to the wall, before the impact
     partner: Any = -1
-    lasted: Any = None  # `Lasted`, of a contact that takes time
-    images: Vec = ZERO  # of the cell, from that where the particle is booked
+    lasted: Any = None  # `Lasted`, for a contact that takes time
+    images: Vec = ZERO  # the cell, relative to that where the particle is booked
 
 
 class Log(NamedTuple):
-    """Arrays of one entry a row, `filled` so far, and what says which rows there are."""
+    """Arrays with an entry for each row, `filled` so far, and the choice of rows."""
 
     time: Array  # (rows,) [s]
     particle: Array  # (rows,) int32
     wall: Array  # (rows,) int32, its number in the scene
-    position: Array  # (rows, 3) [m], in the cell where the scene repeats
+    position: Array  # (rows, 3) [m], in the periodic cell if there is one
     velocity_before: Array  # (rows, 3) [m/s]
     velocity_after: Array  # (rows, 3)
     impulse: Array  # (rows,) [N s], along the wall's normal
     slip: Any  # (rows, 3) [m/s] tangential velocity relative to the wall, before; None without friction
-    image: Any  # (rows, 3) int32, how many cells away that is; None where the scene does not repeat
-    partner: Any  # (rows,) int32, the particle that it meets, -1 at a wall; None where particles do not meet
-    duration: Any  # (rows,) of the contacts of grains, as in `Lasted`; None of impacts
+    image: Any  # (rows, 3) int32, the cell of the position; None if the scene is not periodic
+    partner: Any  # (rows,) int32, the particle that is met, -1 at a wall; None if particles do not meet
+    duration: Any  # (rows,) of the contacts of grains, as in `Lasted`; None for impacts
     largest_force: Any
     friction_loss: Any
-    filled: Array  # (2,) int64, and how many rows had no room
+    filled: Array  # (2,) int64, the number of rows, and of rows that had no room
     going: Array  # (GOING,) int64
     order: Array  # int64, the lanes of a pass that have a row
     chosen: Any  # (N,) bool, the particles that have rows; None: all
@@ -80,19 +80,19 @@ class Log(NamedTuple):
     room: int  # rows that one pass may have
 
     def keep_before(self, lanes, live):
-        """Keep every lane as it is before its contact."""
+        """Keep the state of every lane before its contact."""
         for i in range(index(live)):
             lane, before = lanes.lane(i), BeforeContact(lanes.before, i)
             before.r, before.v, before.remaining, before.hits = lane.r, lane.v, lane.remaining, lane.hits
             before.wall, before.impulse = lanes.wall[i], 0.0
 
     def note(self, lanes, i, impulse):
-        """Note the impulse per mass that the wall of a lane gives."""
+        """Note the impulse per mass of the wall of a lane."""
         BeforeContact(lanes.before, i).impulse += impulse
 
     @outlined
     def add_rows(self, method, walls, state, lanes, live):
-        """A row for each lane with one more impact than before its contact, unless contacts take time."""
+        """Add a row for each lane with one more impact than before its contact, unless contacts take time."""
         if method.laws_at_ends is not None:
             return
         order, n = self.order, index(0)
@@ -108,13 +108,13 @@ class Log(NamedTuple):
 
     @outlined
     def hit(self, image, struck):
-        """A row for an impact, if one of its particles has rows."""
+        """Add a row for an impact, if one of its particles has rows."""
         if self.has(struck.particle) or (struck.partner >= 0 and self.has(struck.partner)):
             self._add(image, struck)
 
     @outlined
     def ended(self, image, struck, images):
-        """A row for a contact that has ended in a step, as `hit`, so many cells farther away, where there is room."""
+        """Add a row for a contact that has ended in a step, as `hit`, shifted by `images` cells, if there is room."""
         if self.filled[0] >= self.time.size:
             self.filled[1] += 1
             return
@@ -123,10 +123,10 @@ class Log(NamedTuple):
         self.shift(first, images)
 
     def add_crossing(self, state, particle, there, number, images):
-        """A row for a particle that crosses a counter where the lane `there` is; number = 2 counter + sense."""
+        """Add a row for a particle that crosses a counter at the lane `there`; number = 2 counter + sense."""
         if not self.has(particle):
             return
-        # The rest is for the impacts of this pass.
+        # The rest of the rows is for the impacts of this pass.
         if self.filled[0] + LANES >= self.time.size:
             self.filled[1] += 1
             return
@@ -135,7 +135,7 @@ class Log(NamedTuple):
         self._add(state.image, crossing)
 
     def shift(self, first, images):
-        """Rows from one on are so many cells farther away."""
+        """Shift the rows from `first` on by `images` cells."""
         if self.image is not None:
             for k in range(first, self.filled[0]):
                 for axis, images_along in enumerate(images):
@@ -146,9 +146,9 @@ class Log(NamedTuple):
         return True if self.chosen is None else self.chosen[index(particle)]
 
     def with_slip(self, laws, now, struck, touch=None):
-        """A `Struck` with the velocity along the wall, where the log has that; `now` are the walls at that time.
+        """Return a `Struck` with the velocity along the wall, if the log has it; `now` are the walls at that time.
 
-        A ball is in contact with the wall at `touch`; None: at its place.
+        A ball is in contact with the wall at `touch`, by default at its place.
         """
         if self.slip is None:
             return struck
@@ -188,18 +188,18 @@ def _put(rows, k, vector):
 
 
 def is_full(log):
-    """Whether a pass may have more rows than there is room for."""
+    """Whether a pass may need more rows than there is room for."""
     return False if log is None else log.filled[0] + log.room > log.time.size
 
 
 def keep_going(log, place, live, passes):
-    """Keep where a kernel is that ends since its log is full."""
+    """Keep the state of a kernel that ends because its log is full."""
     for k, number in enumerate((*place, live, passes)):
         log.going[k] = number
 
 
 def gone_on(log):
-    """The place where a kernel goes on: (`ThreadPlace`, live lanes, passes)."""
+    """Return the state from which a kernel continues: (`ThreadPlace`, live lanes, passes)."""
     if log is None:
         return ThreadPlace(0, 0, 0), 0, 0
     i, stop, drawn, live, passes = tuple(log.going[k] for k in range(GOING))
