@@ -21,8 +21,8 @@ The public names by topic; `help(swarm.simulate)` and so on describe each:
     Errors         SwarmError, SceneError, RunError, FileError,
                    CompleteError, WallTimeError
 
-They are loaded when they are first used, so that `swarm --help` need not
-wait for Numba. `swarm docs -o FOLDER` writes pages of them all.
+They are loaded when they are first used, so that `swarm --help` does not
+wait for Numba. `swarm docs -o FOLDER` writes a page for each of them.
 """
 
 import importlib
@@ -92,7 +92,7 @@ if TYPE_CHECKING:
 __version__ = VERSION
 moved.find()
 
-# A module of the package and the public names that it defines.
+# The modules of the package, and the public names that each defines.
 _HOMES = {
     "bodies.body": ("Body", "Strain"),
     "bodies.elastic": ("elastic",),
@@ -128,7 +128,7 @@ _HOMES = {
     "surfaces.laws": ("Absorb", "CercignaniLampis", "Lambert", "Sticky"),
     "surfaces.wall_law": ("Leave", "WallLaw"),
 }  # fmt: skip
-# A public name that is a package, which may be called.
+# The public names that are packages, which may be called.
 _PACKAGES = ("run",)
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -150,7 +150,7 @@ def __getattr__(name: str) -> Any:
         return importlib.import_module(f".{name}", __name__)
     if name not in _HOME:
         raise AttributeError(f"module 'swarm' has no attribute {name!r}")
-    # No other public name is the name of a module: importing that module would hide it.
+    # No other public name is the name of a module, as importing the module would hide it.
     value = getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
     signature = importlib.import_module(".common.signature", __name__)
     signature.show_in_lines(value)

@@ -1,4 +1,4 @@
-"""Observables of balls: how often they meet one another, the pressure by the virial, the energy of their spins."""
+"""Observables of balls: their collision rate, the pressure by the virial, the energy of their spins."""
 
 import math
 from typing import Any
@@ -10,14 +10,14 @@ from .particles import Particles
 from .scene import Scene
 from .state import Floats, State
 
-# The moment of inertia of a ball is so much of m R^2, in a plane too.
+# The moment of inertia of a ball, as a part of m R^2; in a plane too.
 INERTIA = 0.4
-# What is kept of the last frame.
+# The numbers that are kept of the last frame.
 _LAST = "time", "collisions", "virial", "kinetic", "action", "collision_rate", "pressure"
 
 
 def inertias(mass: Floats, radius: Floats) -> Floats:
-    """The moments of inertia of balls [kg m^2], (N,)."""
+    """The moments of inertia of balls (N,) [kg m^2]."""
     return np.asarray(INERTIA * mass * radius * radius)
 
 
@@ -34,25 +34,25 @@ def balls_volume(scene: Scene, radius: Floats) -> float:
 
 
 def volume_of(scene: Scene, particles: Particles) -> float:
-    """The volume that particles have [m^3], in a plane the area: that they were filled into, else of the cell.
+    """The volume of particles [m^3], in a plane the area [m^2]: what `fill` filled with them, else the cell.
 
-    NaN where neither is known.
+    It is NaN if neither is known.
     """
     if particles.volume is not None:
         return particles.volume
     lengths = [None if scene.period is None else scene.period[k] for k in scene.axes()]
-    # Surfaces in a cell take some of it, which only `fill` knows.
+    # Surfaces take a part of the cell, which only `fill` computes.
     if not scene.surfaces and None not in lengths:
         return math.prod(length for length in lengths if length is not None)
     return math.nan
 
 
 class BallNumbers:
-    """The observables of balls from frame to frame: an engine tells it each frame once, when it is done.
+    """The observables of balls from frame to frame; an engine calls `frame` once for each frame that is done.
 
     Args:
-        scene: the balls' scene, with its volume of three dimensions or of two.
-        particles: at the start.
+        scene: the scene of the balls, in three or two dimensions.
+        particles: the balls at the start.
 
     >>> import swarm
     >>> from swarm.state import Balls, State
@@ -73,19 +73,18 @@ class BallNumbers:
         self._last = np.zeros(len(_LAST))
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """What a run that goes on needs, for `BaseRun.arrays`."""
+        """Return the arrays that a resumed run needs, for `BaseRun.arrays`."""
         return {"ball_numbers": self._last}
 
     def frame(self, state: State, moment: float, kinetic: float, action: float | None = None) -> None:
         """Take a frame that is done.
 
         Args:
-            state: at the frame.
-            moment: of the frame [s]; 0 is the start.
-            kinetic: energy of the translation at the frame, of the balls that move: what others keep presses on nothing
-                [J].
-            action: its integral since the start [J s]; None: by the trapezoidal rule over frames, which is exact where
-                it does not change.
+            state: the state at the frame.
+            moment: the time of the frame [s]; 0 is the start.
+            kinetic: the energy of the translation of the moving balls at the frame [J]; held balls press on nothing.
+            action: the integral of this energy since the start [J s]; None: by the trapezoidal rule over frames, which
+                is exact for a constant energy.
         """
         balls = state.balls
         assert balls is not None
@@ -102,7 +101,7 @@ class BallNumbers:
         self._last[:] = moment, collisions, virial, kinetic, action or 0.0, rate, pressure
 
     def seen(self, state: State) -> dict[str, Any]:
-        """The observables of the last frame that only balls have."""
+        """Return the observables of the last frame that only balls have."""
         balls = state.balls
         assert balls is not None
         found = {"collisions": _collisions(state), "collision_rate": float(self._last[-2])}
@@ -112,7 +111,7 @@ class BallNumbers:
         return found
 
     def added(self, seen: dict[str, Any], state: State) -> dict[str, Any]:
-        """The observables of a frame, `seen` of points, of balls: with those above, and with spins in the sums."""
+        """Return the observables of a frame with those of balls, from `seen` of points; sums include spins."""
         mine, balls = self.seen(state), state.balls
         if balls is None or balls.spin is None:
             return {**seen, **mine}
@@ -124,6 +123,6 @@ class BallNumbers:
 
 
 def _collisions(state: State) -> int:
-    """How many pairs have met since the start: both of each have counted it."""
+    """The number of collisions since the start, each of which both balls have counted."""
     assert state.balls is not None
     return state.balls.sum_of_collisions(state.mass.size) // 2

@@ -28,18 +28,18 @@ from .surfaces.walls import Field, Listed, Walls, all_walls
 if TYPE_CHECKING:
     from .scene import Scene
 
-# The most walls that kernels are compiled for: with `contact_step` this many take three minutes.
+# The most walls for which kernels are compiled: with `contact_step` this number takes three minutes.
 MOST_WALLS = 24
 # The `apart` of a scene in which impacts move a wall: each listed solid is a wall.
 REACTING = "walls that react"
-# The `apart` of a method that cuts its steps at impacts: the same, but a field keeps its members.
+# The `apart` of a method that cuts its steps at impacts: each listed solid is a wall, and a field keeps its members.
 CUT = "steps that are cut at impacts"
 # The law of a wall without temperature.
 _NO_HEAT = Thermal(0.0, 0.0)
 
 
 class PartsOfRows(NamedTuple):
-    """The part of each row, which is `number` where its surface has no parts; and the number of parts."""
+    """The part of each row, or `number` if its surface has no parts, and the number of parts."""
 
     rows: tuple[int, ...]
     number: int
@@ -48,20 +48,20 @@ class PartsOfRows(NamedTuple):
 class Numbering:
     """The numberings of walls, and all translations among them.
 
-    | number | what is counted | in the order of |
+    | number | counted things | in the order of |
     | --- | --- | --- |
-    | surface | what the user listed in `Scene.surfaces` | the user |
+    | surface | the entries of `Scene.surfaces` | the user |
     | part | the simple parts of unions and intersections, `Scene.parts` | surfaces |
     | piece | simple surfaces, `Pieces.each`: a surface or a part, or an image of one | surfaces, images, parts |
-    | row | what impulses and heat are summed for: a wall, or a field with all its members | walls |
-    | wall | what a flight meets; of a field each of its members | kinds: fields, groups, others, unions |
+    | row | the entries of sums of impulses and heat: a wall, or a field with all its members | walls |
+    | wall | the walls that a flight meets, each member of a field | kinds: fields, groups, others, unions |
 
     A wall belongs to one row, a row to one piece, and a piece to one surface and at most one part.
 
     Attributes:
         pieces_of_rows: the piece of each row, (rows,).
         surfaces_of_rows: the surface of each row.
-        parts_of_rows: the part of each row; None where no surface has parts.
+        parts_of_rows: the part of each row; None if no surface has parts.
         pieces_of_walls, rows_of_walls: the piece and the row of each wall, (walls,).
         members: the surface of each wall, and its number in a field, else its part, else -1: (2, walls).
     """
@@ -89,7 +89,7 @@ class Numbering:
             first += count
 
     def split(self, values: NDArray[Any]) -> list[NDArray[Any]]:
-        """The values of the members of each surface, from (..., members) of all surfaces one after the other."""
+        """Return the values of the members of each surface, from (..., members) of all surfaces in order."""
         surface, member = self.members
         counts = np.zeros(int(surface.max()) + 1, np.int64)
         np.maximum.at(counts, surface, member + 1)
@@ -97,7 +97,7 @@ class Numbering:
 
 
 def is_in_steps(apart: str | None) -> bool:
-    """Whether a method with this `apart` goes by steps, which may end outside of walls and of a cell."""
+    """Whether a method with this `apart` has steps, which may end outside of walls and of a cell."""
     return apart is not None and apart != REACTING
 
 
@@ -106,14 +106,14 @@ class CompiledScene:
 
     Args:
         scene: the description.
-        largest: the largest radius of the balls in the scene [m]; None: its particles are points.
+        largest: the largest radius of the balls in the scene [m]; None: the particles are points.
         apart: the method that does not take listed solids of one kind as a field, in words for errors; None: more than
-            a few of them are a field.
+            a few such solids are a field.
 
     Attributes:
         scene, largest: as the arguments.
         pieces: the pieces that the particles meet.
-        order: their numbers in the order of the walls.
+        order: the numbers of the pieces in the order of the walls.
 
     Raises:
         SceneError: there are more walls than kernels can be compiled for.
@@ -121,7 +121,7 @@ class CompiledScene:
 
     def __init__(self, scene: "Scene", largest: float | None = None, apart: str | None = None) -> None:
         self.scene, self.largest, self._apart = scene, largest, apart
-        # The walls where nothing moves, by which of the pieces are there.
+        # The walls of a scene without motion, by which of the pieces are present.
         self._known: dict[tuple[bool, ...], Walls] = {}
         in_steps = largest is None and is_in_steps(apart)
         reach = scene.reach_of_steps() if in_steps else largest
@@ -135,10 +135,10 @@ class CompiledScene:
             why = why if apart is None else f" with {apart}"
             raise SceneError(
                 f"surfaces must have at most {MOST_WALLS} walls in all{why}, got {walls} of "
-                f"{len(self.scene.surfaces)} surfaces: each wall is compiled into the kernels, which takes minutes "
-                "with so many; remove some (a box has 3 walls, a capped cylinder 2, most others 1), or use solids of "
-                "one kind, of which any number is one field for Impact where nothing moves, and as Spheres and the "
-                "like always"
+                f"{len(self.scene.surfaces)} surfaces: each wall is compiled into the kernels, which would "
+                "take minutes; remove some (a box has 3 walls, a capped cylinder 2, most others 1), or use solids of "
+                "one kind: any number of them is one field for Impact if nothing moves, and one surface of many "
+                "bodies, such as swarm.Spheres, always is"
             )
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -146,7 +146,7 @@ class CompiledScene:
         return CompiledScene, (self.scene, self.largest, self._apart)
 
     def of_balls(self, largest: float) -> "CompiledScene":
-        """The same for balls with radii up to the largest one [m]."""
+        """Return the compiled scene for balls with radii up to `largest` [m]."""
         return CompiledScene(self.scene, largest, self._apart)
 
     @cached_property
@@ -160,7 +160,7 @@ class CompiledScene:
 
     @cached_property
     def laws(self) -> Laws | None:
-        """The laws of every wall, None where no surface has one."""
+        """The laws of every wall; None if no surface has a law."""
         runs: list[tuple[int, Surface, int]] = []
         for i, walls in self._spans:
             piece = self.pieces.each[i]
@@ -177,24 +177,24 @@ class CompiledScene:
         return None if laws == NONE else laws.in_plane(self.scene.across())
 
     def lawful(self) -> list[Surface]:
-        """The surface that has the laws, for each wall."""
+        """Return the surface with the laws of each wall."""
         runs = [run for i, walls in self._spans for run in self.pieces.each[i].runs(walls)]
         return [surface for surface, walls in runs for _wall in range(walls)]
 
     def openings(self, moment: float = 0.0, some: list[tuple[int, int]] | None = None) -> tuple[Opened, ...] | None:
-        """The openings of the walls in the frame that ends at a moment [s], or None.
+        """Return the openings of the walls in the frame that ends at a moment [s], or None.
 
-        They are those of all walls, or of `some`, consecutive ones: (piece, number of walls) each.
+        They are the openings of all walls, or of `some` consecutive walls: (piece, number of walls) each.
         """
         spans, volumes, doorways = self._spans if some is None else some, self.pieces.volumes, self.pieces.doorways
         if self.largest is None:
             return openings_in(spans, (volumes, doorways), moment) or None
-        # Balls meet a union as one surface, so doors between its rooms open nothing; files still have times of escapes.
+        # Balls meet a union as one surface, so doors between its rooms open nothing; files still have escape times.
         made = openings_in(spans, (volumes, ((),) * len(volumes)), moment)
         return made if made or any(doorways) else None
 
     def walls(self, moment: float = 0.0) -> Walls:
-        """The walls by their kinds, in the frame, or the piece of one, that ends at a moment [s]."""
+        """Return the walls by their kinds, in the frame, or the piece of a frame, that ends at a moment [s]."""
         if self.scene.moves():
             return self._made(moment)
         there = tuple(was_there(piece.present, moment) for piece in self.pieces.each)
@@ -203,19 +203,19 @@ class CompiledScene:
         return self._known[there]
 
     def walls_of_bodies(self, own: Sequence[Surface], moment: float = 0.0) -> Walls:
-        """The walls for bodies at a moment [s]: those of `walls`, then those of the surfaces of a body, at rest."""
+        """Return the walls for bodies at a moment [s]: the walls of the scene, then the surfaces of a body, at rest."""
         return self._made(moment, own)
 
     @cached_property
     def of_no_mass(self) -> "CompiledScene | None":
-        """The scene of the surfaces that impacts do not move; None where impacts move all of them."""
+        """The scene of the surfaces that impacts do not move; None if impacts move all surfaces."""
         scene = self.scene
         rest = [surface for surface in scene.surfaces if not surface.reacts()]
         made = type(scene)(rest, scene.gravity, plane=scene.plane) if rest else None
         return None if made is None else made.compiled(self.largest, REACTING)
 
     def cell(self) -> Period | None:
-        """The cell that repeats."""
+        """Return the periodic cell, or None."""
         period, gravity = self.scene.period, self.scene.gravity
         if period is None:
             return None
@@ -225,18 +225,18 @@ class CompiledScene:
         return cell_in(period, self.scene.surfaces, has_fields, fall, self.largest or 0.0)
 
     def fields(self) -> list[int]:
-        """The surfaces that are many bodies."""
+        """Return the numbers of the surfaces that are fields."""
         return [self.pieces.owners[i] for i in self.order.fields]
 
     def unions(self) -> list[int]:
-        """The surfaces that are unions of several rooms."""
+        """Return the numbers of the surfaces that are unions of several rooms."""
         return [self.pieces.owners[rooms[0][0]] for rooms in self.order.unions]
 
     # --- Walls ---------------------------------------------------------------------------------------
 
     @cached_property
     def _groups(self) -> list[Members]:
-        """The listed solids that are fields."""
+        """The groups of listed solids that are fields."""
         repeated = None if self.scene.period is None else corners_of(self.scene.period)
         return [members_of(self._pieces_at(group), repeated, self.largest) for group in self.order.groups]
 
@@ -244,7 +244,7 @@ class CompiledScene:
         return [self.pieces.each[i] for i in numbers]
 
     def _made(self, moment: float, own: Sequence[Surface] | None = None) -> Walls:
-        """The walls for particles or, with the surfaces of a body, for bodies."""
+        """Return the walls for particles or, with the surfaces of a body, for bodies."""
         scene, order, fields = self.scene, self.order, self._pieces_at(self.order.fields)
         straight = scene.gravity is None and own is None
 
@@ -270,14 +270,14 @@ class CompiledScene:
 
 
 def _of_walls(values: list[Any], spans: list[tuple[int, int]], neutral: Any) -> tuple[Any, ...] | None:
-    """The value of every wall, from values and spans (value, number of walls); None where all are neutral."""
+    """Return the value of every wall, from values and spans (value, number of walls); None if all are neutral."""
     if all(value == neutral for value in values):
         return None
     return tuple(values[k] if walls == 1 else Span(values[k], float(walls)) for k, walls in spans)
 
 
 def _thermal(surface: Surface) -> Thermal:
-    """The temperature and the accommodation of a surface, for kernels."""
+    """Return the temperature and the accommodation of a surface, for kernels."""
     if surface.temperature is None:
         return _NO_HEAT
     return Thermal(surface.temperature, surface.accommodation)

@@ -1,12 +1,12 @@
-"""Errors: each message says what was expected, what was given, where, and how to fix it."""
+"""Errors. Each message says what was expected, what was given, where, and how to fix it."""
 
 
 class SwarmError(Exception):
-    """Base of every error that swarm raises on purpose."""
+    """The base of every error that swarm raises on purpose."""
 
 
 class SceneError(SwarmError, ValueError):
-    """Bad input: an argument, a TOML key, a row of a file. Found before anything runs or is written.
+    """Bad input: an argument, a TOML key, or a row of a file, found before anything runs or is written.
 
     Attributes:
         particle: the number of the first particle with the error; None if the error is not about particles.
@@ -24,10 +24,10 @@ class FileError(SwarmError, OSError):
 
 
 class WallTimeError(SwarmError):
-    """A run that stopped at its wall time limit; if it makes checkpoints, it can be resumed.
+    """A run that stopped at its wall time limit. A run with checkpoints can be resumed.
 
     Attributes:
-        compiled: seconds after the limit that a compilation which was under way took to end.
+        compiled: the time after the limit at which a compilation under way ended [s].
     """
 
     def __init__(self, message: str, compiled: float = 0.0) -> None:

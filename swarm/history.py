@@ -1,4 +1,4 @@
-"""The iteration of a single contact step of one particle, sweep by sweep: to study a method, not to run it."""
+"""The iteration of a single contact step of one particle, sweep by sweep, to study a method."""
 
 import math
 from dataclasses import dataclass, fields
@@ -65,19 +65,19 @@ class ContactHistory:
 def contact_history(
     scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float, method: Method
 ) -> ContactHistory:
-    """Uzawa's iteration of a single step of one particle.
+    """Return Uzawa's iteration of a single step of one particle.
 
     Args:
         scene: the walls and gravity.
         position: r0, three numbers [m].
         velocity: v0, three numbers [m/s].
         mass: m > 0 [kg].
-        method: AugmentedLagrangian; or Penalty, or Impact with a contact_step, with one solve as its one sweep. With
-            adaptive=True, and for Impact, the particle first flies to its next impact; or to half a step before it with
-            contact_start = "centred", where Phi is that of the gap less the one there.
+        method: AugmentedLagrangian; or Penalty, or Impact with a contact_step, where one solve is the only sweep. With
+            adaptive=True, and for Impact, the particle first flies to its next impact. With contact_start = "centred"
+                it flies to half a step before the impact, and Phi is that of the gap minus the gap at the impact.
 
     Returns:
-        A `ContactHistory` with a sweep at least, and at most max_sweeps of them.
+        A `ContactHistory` with from 1 to max_sweeps sweeps.
 
     Raises:
         SceneError: a bad argument; Impact with contact_step = 0, which has no step; no impact ahead.
@@ -107,7 +107,7 @@ def contact_history(
     method.check(scene, particle)
     compiled = scene.compiled(apart="contact_history")
     _require_one_wall(compiled, method)
-    # The functions of kernels, in plain Python; with NumPy's numbers 1/0 is an infinity as in compiled kernels.
+    # The functions of kernels run in plain Python; with numbers of NumPy, 1/0 is infinite as in compiled kernels.
     start = CutStep(vec(particle.position[:, 0]), vec(particle.velocity[:, 0]))
     with np.errstate(all="ignore"):
         if isinstance(method, AugmentedLagrangian):
@@ -123,7 +123,7 @@ def contact_history(
 
 
 def _require_one_wall(compiled: CompiledScene, method: Method) -> None:
-    """Raise a `SceneError` where a surface is not taken as one wall."""
+    """Raise a `SceneError` where a method would not take a surface as one wall."""
     for i, piece in compiled.pieces.owned():
         if piece.is_one_wall and not isinstance(method, Penalty):
             raise SceneError(
@@ -133,7 +133,7 @@ def _require_one_wall(compiled: CompiledScene, method: Method) -> None:
 
 
 class CutStep(NamedTuple):
-    """Position and velocity before the step, and where it is cut at an impact its length [s] and the wall."""
+    """Position and velocity before the step; if it is cut at an impact, also its length [s] and the wall."""
 
     r: Vec
     v: Vec
@@ -150,7 +150,7 @@ class _HistoryRows:
         self._rows: list[tuple[Any, ...]] = []
 
     def add(self, multiplier: Floats, mean: Floats, reactions: Floats, stored: float) -> None:
-        """One sweep: lambda, alpha Phi_mean, and c D (alpha Phi_mean + lambda) and Phi1 of each wall."""
+        """Add a sweep: lambda, alpha Phi_mean, and c D (alpha Phi_mean + lambda) and Phi1 of each wall."""
         reactions, constraint = reactions[:, :3], reactions[:, 3].copy()
         total = reactions.sum(axis=0)
         r1 = np.array(self.step.r) + (np.array(self.step.p) - total)
@@ -170,7 +170,7 @@ class _HistoryRows:
 
 
 def _at_the_wall(compiled: CompiledScene, start: CutStep, h: float, begins: str) -> CutStep:
-    """The start of the contact step at the next impact, of length h if the flight to it is long enough."""
+    """Return the start of the contact step at the next impact, of length h if the flight to it is long enough."""
     walls = compiled.walls()
     hit = flights.first_hit(walls, None, start.r, start.v)
     if not np.isfinite(hit.time):

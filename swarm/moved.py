@@ -1,4 +1,4 @@
-"""Modules that moved: imports of their earlier names find them, with a `DeprecationWarning`."""
+"""Modules that moved: imports by earlier names find them, with a `DeprecationWarning`."""
 
 import importlib
 import importlib.machinery
@@ -90,7 +90,7 @@ def _dotted(*parts: str) -> str:
     return ".".join((__package__, *filter(None, parts)))
 
 
-# A folder that moved as a whole, and its present name.
+# The folders that moved as a whole, with their present names.
 _WHOLE = {_dotted(old): _dotted(new) for old, new, names in _FOLDERS if names == "*"}
 MOVED = {
     _dotted(old, before): _dotted(new, after or before)
@@ -101,7 +101,7 @@ MOVED = {
 
 
 def present_name(name: str) -> str | None:
-    """The present name of a module that moved, or None.
+    """Return the present name of a module that moved, or None.
 
     >>> present_name("swarm.output.style")
     'swarm.pictures.style'
@@ -110,7 +110,7 @@ def present_name(name: str) -> str | None:
     """
     folder, _, leaf = name.rpartition(".")
     present = MOVED.get(name) or (f"{_WHOLE[folder]}.{leaf}" if folder in _WHOLE else None)
-    # Some moved more than once.
+    # Some modules moved more than once.
     return present and (present_name(present) or present)
 
 
@@ -128,7 +128,7 @@ class _Finder:
 
 
 class _Loader:
-    """Loads the module of another name."""
+    """A loader of the module with another name."""
 
     def __init__(self, present: str) -> None:
         self._present = present
@@ -139,11 +139,11 @@ class _Loader:
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        # The import system has put the earlier name into the module.
+        # The import system has written the earlier name into the module.
         module.__spec__ = self._spec
 
 
 def find() -> None:
     """Let imports find modules by their earlier names."""
-    # In front: the path of an earlier folder is that of a present one, where others would find a second copy.
+    # In front of other finders, which would find a second copy where an earlier folder has the path of a present one.
     sys.meta_path.insert(0, _Finder())

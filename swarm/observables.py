@@ -24,14 +24,14 @@ CHUNK = 256
 # Partial sums run in this many interleaved columns, which the compiler vectorises without reordering any.
 _COLUMNS = 64
 
-# Rows for a counter: the number of crossings and the sums, in both senses.
+# The rows of a counter: the number of crossings and the sums, in both senses.
 COUNTED = 2 * (1 + CROSSED)
 
 _KINETIC, _POTENTIAL, _CONTACT, _PX, _PY, _PZ, _LX, _LY, _LZ, _ENERGY_ERROR, _PENETRATION, ROWS = range(12)
 
 
 def _whole_fall(period, state, i, in_cell):
-    """The potential energy per mass of particle i where it is, if it has come through the faces of the cell."""
+    """The potential energy per mass of particle i at its place in space, from that of its place in the cell."""
     if period is None or period.fall is None:
         return in_cell
     fall, image = period.fall, state.image
@@ -39,14 +39,14 @@ def _whole_fall(period, state, i, in_cell):
 
 
 class Energies(NamedTuple):
-    """Kinetic, potential and contact energy per mass of one particle, or of many as arrays."""
+    """Kinetic, potential and contact energy per mass of one particle, or of many particles as arrays."""
 
     kinetic: Any
     fall: Any
     stored: Any
 
     def total(self) -> Any:
-        """Their sum."""
+        """The sum of the three energies."""
         return self.kinetic + self.fall + self.stored
 
 
@@ -55,33 +55,33 @@ def _energies(law, walls, gravity, m, r, v):
 
 
 def energies(compiled: CompiledScene, law: Any, mass: Floats, position: Floats, velocity: Floats) -> Energies:
-    """The energies of particles, positions and velocities (3, N), at time 0.
+    """Return the energies of particles with positions and velocities (3, N) at time 0.
 
-    Without a kernel: those of one particle go through NumPy.
+    This has no kernel, as the functions for one particle also take arrays.
     """
     stored = np.zeros(len(mass))
     if law is not None:
         walls = compiled.walls().at(0.0)
-        # Few particles are in a wall, and its law takes one number.
+        # Few particles are in a wall, and the law of a wall takes one number.
         for i in np.flatnonzero((compiled.scene.gaps(position) > 0.0).any(axis=0)):
             stored[i] = contact_energy(law, walls, 1.0 / mass[i], column(position, 0, i))
     return Energies(0.5 * square(vec(velocity)), potential(compiled.scene.pull(), vec(position)), stored)
 
 
 def energy_scale(scene: Scene, start: Energies) -> Floats:
-    """The scale of energy errors: kinetic + contact + m |G| size at the start, per mass."""
+    """Return the scale of energy errors: kinetic + contact + m |G| size at the start, per mass."""
     size, pull = scene.finite_size(), scene.pull()
     weight = abs(potential(pull, Vec(size, 0.0, 0.0))) + abs(potential(pull, Vec(0.0, size, 0.0)))
     weight += abs(potential(pull, Vec(0.0, 0.0, size)))
     return np.asarray(start.kinetic + start.stored + weight)
 
 
-# Temporary arrays of so many particles stay in the cache: 2.9 instead of 5.1 ns a particle.
+# Temporary arrays of this number of particles stay in the cache: 2.9 instead of 5.1 ns a particle.
 _AT_ONCE = 32_768
 
 
 def start_energies(compiled: CompiledScene, law: Any, state: State) -> None:
-    """Fill `energy` and `inverse_scale` of the state."""
+    """Set `energy` and `inverse_scale` of the state."""
     for first in range(0, state.mass.size, _AT_ONCE):
         some = slice(first, first + _AT_ONCE)
         start = energies(compiled, law, state.mass[some], state.position[:, some], state.velocity[:, some])
@@ -94,7 +94,7 @@ def start_energies(compiled: CompiledScene, law: Any, state: State) -> None:
 def observe(law, walls, gravity, state, drawn, size, partial):
     """Write the sums and maxima of each chunk into partial[chunk, ROWS].
 
-    The chunks are those of the particles k size to (k + 1) size for every k in `drawn`; `size` is whole chunks.
+    The chunks have the particles k size to (k + 1) size for every k in `drawn`; `size` is a multiple of CHUNK.
     """
     position, velocity, mass = state.position, state.velocity, state.mass
     energy, inverse_scale = state.energy, state.inverse_scale
@@ -128,7 +128,7 @@ def observe(law, walls, gravity, state, drawn, size, partial):
                     sums[_LZ, j] += spin.z
                     sums[_ENERGY_ERROR, j] = select(error > sums[_ENERGY_ERROR, j], error, sums[_ENERGY_ERROR, j])
                     sums[_PENETRATION, j] = select(depth > sums[_PENETRATION, j], depth, sums[_PENETRATION, j])
-            # Pairwise over the columns.
+            # The columns are reduced pairwise.
             half = _COLUMNS // 2
             while half > 0:
                 for row in range(ROWS):
@@ -142,7 +142,7 @@ def observe(law, walls, gravity, state, drawn, size, partial):
 
 @kernel
 def store(law, walls, remaining, state, into):
-    """Write the stored energy of each particle per mass, when so much of the frame is left [s], into an array (N,)."""
+    """Write the stored energy per mass of each particle, with `remaining` [s] of the frame left, into an array (N,)."""
     now = walls.at(remaining)
     for i in range(state.mass.size):
         r = column(state.position, 0, i)
@@ -151,11 +151,11 @@ def store(law, walls, remaining, state, into):
 
 @kernel
 def count_escaped(walls, gravity, far, faces, state):
-    """The number of particles that leave an open scene for ever, but not through an opening of a wall.
+    """Return the number of particles that leave an open scene for ever, but not through an opening of a wall.
 
-    These are farther from the origin than `far`, or in a straight flight that hits no wall, or beyond one of the open
-    `faces`, rows (n, offset), and fly in its direction n: the walls beside that face are endless, and a particle that
-    hits them there still leaves.
+    Such a particle is farther from the origin than `far`, or in a straight flight that hits no wall, or beyond an open
+    face of `faces`, rows (n, offset), and flies in its direction n. The walls beside such a face are endless, and a
+    particle that hits them beyond the face still leaves.
     """
     position, velocity, count = state.position, state.velocity, 0
     for i in range(state.mass.size):
@@ -171,14 +171,14 @@ def count_escaped(walls, gravity, far, faces, state):
 
 def _escapes(period, gravity, walls, r, v):
     """Whether a flight hits no wall. Under gravity only the distance decides."""
-    # With a period, one that hits no wall of its cell may hit those of others.
+    # In a periodic scene, a flight that hits no wall of its cell may hit walls of other cells.
     if period is not None or gravity is not None:
         return False
     return (flights.first_hit(walls.at(0.0), gravity, r, v).time == np.inf) & (square(v) > 0.0)
 
 
 def books(seen: dict[str, Any]) -> dict[str, Floats]:
-    """What has changed the energy of all since the first frame [J], each with the sign with which it does."""
+    """Return the changes of the total energy since the first frame by their causes [J], with their signs."""
     zero = np.zeros(len(seen["time"]))
     moved = np.sum(seen.get("wall_work", zero[:, None]), axis=1)
     changes = {
@@ -192,9 +192,9 @@ def books(seen: dict[str, Any]) -> dict[str, Floats]:
 
 
 def drift(seen: dict[str, Any]) -> float:
-    """The largest change of the energy of all that is in no book, over the energy that moved or was there at most.
+    """Return the largest unexplained change of the total energy, relative to the largest energy involved.
 
-    The zero of the potential energy is arbitrary, so of that only what changes counts. Where nothing moved, it is in J.
+    The zero of the potential energy is arbitrary, so only its range counts. Without an energy the result is in J.
     """
     changes, total = books(seen), np.asarray(seen["total_energy"])
     change = np.abs(total - total[0] - np.sum(list(changes.values()), axis=0)).max()
@@ -204,11 +204,11 @@ def drift(seen: dict[str, Any]) -> float:
 
 
 def chunk_sums(partial: Floats, state: State, lasts: bool) -> Floats:
-    """The sums over the particles of each chunk: (quantities, chunks).
+    """Return the sums over the particles of each chunk: (quantities, chunks).
 
-    The rows are the sums of `observe`, what was dissipated, how long contacts have lasted, the impulse of each wall
-    with the work of walls that move behind it, the heat of each wall, and what has crossed counters. Chunks are summed
-    on their own and in their order, so those of a part of the particles, of whole chunks, are a part of those of all.
+    The rows are the sums of `observe`, the dissipated energy, the duration of contacts, the impulse of each wall, the
+    work of each wall if walls move, the heat of each wall, and the crossings of counters. Each chunk is summed by
+    itself, so that the sums of a part of the particles, of whole chunks, are a part of the sums of all particles.
     """
     contacts = state.contacts if lasts else None
     n, heat = state.mass.size, state.heat
@@ -231,9 +231,9 @@ def chunk_sums(partial: Floats, state: State, lasts: bool) -> Floats:
 
 
 def add_up(values: NDArray[Any], n: int, sums: Floats) -> None:
-    """Sums of values (rows, n) over chunks into sums (rows, chunks).
+    """Add values (rows, n) over chunks into sums (rows, chunks).
 
-    Of values (rows, 1), which are those of all particles, into the first chunk.
+    Values (rows, 1), which are of all particles together, go into the first chunk.
     """
     if values.shape[1] < n:
         sums[:, :1] = values
@@ -248,19 +248,19 @@ def add_up(values: NDArray[Any], n: int, sums: Floats) -> None:
 def summed(
     sums: Floats, owners: list[int], booked: int, has_heat: bool, parts: PartsOfRows | None = None, counters: int = 0
 ) -> dict[str, Any]:
-    """The observables that are sums over particles, from those of all chunks (quantities, chunks); NumPy adds pairwise.
+    """Return the observables that are sums over particles, from the sums of all chunks (quantities, chunks).
 
-    `owners` says which surface each wall belongs to, `parts` which part of a union, `booked` how many rows of impulse
-    and work there are, `counters` how many counters.
+    `owners` has the surface of each wall, and `parts` its part of a union; `booked` is the number of rows of impulse
+    and work, and `counters` the number of counters. NumPy adds pairwise.
     """
-    # NumPy adds rows in an order that depends on how they lie in memory.
+    # NumPy adds rows in an order that depends on their layout in memory.
     totals = np.add.reduce(np.ascontiguousarray(sums), axis=1)
     kinetic, fall, stored = totals[: _CONTACT + 1].tolist()
     lost, lasted = totals[_ENERGY_ERROR : _ENERGY_ERROR + 2].tolist()
     last = len(totals) - COUNTED * counters
     walls, crossed = totals[_ENERGY_ERROR + 2 : last], totals[last:]
     pushed, heat = walls[:booked], walls[booked:]
-    # The work of walls that move is booked behind their impulses.
+    # The work of moving walls follows their impulses.
     moves = {} if booked == len(owners) else {"wall_work": np.bincount(owners, weights=pushed[len(owners) :])}
     impulse = np.bincount(owners, weights=pushed[: len(owners)])
     return {
@@ -281,7 +281,7 @@ def summed(
 
 
 def of_counters(crossed: Floats, counters: int) -> dict[str, NDArray[Any]]:
-    """What has crossed each counter in each sense, from the rows of `Crossed`."""
+    """Return the crossings of each counter in each sense, from the rows of `Crossed`."""
     if not counters:
         return {}
     sums = crossed[2 * counters :].reshape(counters, 2, CROSSED)
@@ -295,7 +295,7 @@ def of_counters(crossed: Floats, counters: int) -> dict[str, NDArray[Any]]:
 
 
 def _of_parts(parts: PartsOfRows | None, impulse: Floats, heat: Floats | None) -> dict[str, Floats]:
-    """The impulse and the heat of the parts of unions, from those of each row of the scene."""
+    """Return the impulse and the heat of the parts of unions, from the rows of the scene."""
     if parts is None:
         return {}
     given = {"part_impulse": impulse, "part_heat": np.zeros_like(impulse) if heat is None else heat}
@@ -304,7 +304,7 @@ def _of_parts(parts: PartsOfRows | None, impulse: Floats, heat: Floats | None) -
 
 
 def counted(partial: Floats, state: State, lasts: bool) -> dict[str, Any]:
-    """The observables that are largest values, or numbers of something: the order does not matter to them."""
+    """Return the observables that are maxima or counts, which do not depend on the order of particles."""
     multipliers, contacts = state.multipliers, state.contacts if lasts else None
     energy_error, depth = partial[:, _ENERGY_ERROR:].max(axis=0).tolist()
     loops = {} if multipliers is None else {"sweeps": int(multipliers.sweeps.sum())}
@@ -321,7 +321,7 @@ def counted(partial: Floats, state: State, lasts: bool) -> dict[str, Any]:
 def summary(
     partial: Floats, state: State, owners: list[int], lasts: bool, parts: PartsOfRows | None = None
 ) -> dict[str, Any]:
-    """The observables of one frame from the partial sums (chunks, ROWS); `lasts`: a contact has lasted in this run."""
+    """Return the observables of a frame from the partial sums (chunks, ROWS); `lasts`: contacts lasted in this run."""
     sums = chunk_sums(partial, state, lasts)
     counters = 0 if state.crossed is None else len(state.crossed.side)
     added = summed(sums, owners, len(state.impulse), state.heat is not None, parts, counters)

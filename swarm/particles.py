@@ -12,11 +12,11 @@ from .common.columns import read_columns
 from .errors import SceneError
 from .state import Floats
 
-# The arrays of particles, in the order of the arguments that give them.
+# The arrays of particles, in the order of the arguments.
 ARRAYS = "position", "velocity", "mass", "image", "radius", "spin"
 _COLUMNS = ("x", "y", "z", "vx", "vy", "vz")
 _SPINS = ("wx", "wy", "wz")
-# What a frame of a trajectory that was exported as .csv has too; a start does not.
+# The further columns of a frame that was exported as .csv, which a start does not need.
 _OF_FRAMES = (
     "time", "id", "impacts", "collisions", "image_x", "image_y", "image_z", "escape_time", "absorbed_time",
 )  # fmt: skip
@@ -26,7 +26,7 @@ class VolumeEstimate(NamedTuple):
     """A volume [m^3], in a plane an area [m^2]."""
 
     volume: float
-    error: float | None  # its standard error; 0 in closed form, None where it is not known
+    error: float | None  # the standard error; 0 for a closed form, None if not known
 
 
 class Particles:
@@ -36,14 +36,14 @@ class Particles:
         position: (3, N) or (3,) [m], rows x, y, z.
         velocity: (3, N) or (3,) [m/s].
         mass: one number or (N,) [kg], above 0.
-        image: (3, N) whole numbers, or None: in a scene with a period, how many cells away each particle is.
+        image: (3, N) whole numbers, or None: the cell of each particle in a scene with a period.
         radius: one number or (N,) [m], above 0: particles are balls, which meet one another, and walls with their
-            surface; None: they are points and do not meet.
-        spin: (3, N), (3,) or None: of balls the angular velocity [rad/s]; None where nothing turns them.
+            surface; None: particles are points, which do not meet one another.
+        spin: (3, N), (3,) or None: the angular velocity of balls [rad/s]; None if nothing turns them.
 
-    The arrays are copied, in C order. `volume` is the volume they were filled into [m^3], in a plane the area [m^2], or
-    None, and `volume_error` its standard error: 0 where it is a closed form, None where it is not known. Arrays that
-    are assigned later are checked and converted in the same way when a run starts.
+    The arrays are copied, in C order. `volume` is the volume that the particles were filled into [m^3], in a plane the
+    area [m^2], or None. `volume_error` is its standard error: 0 for a closed form, None if not known. Arrays that are
+    assigned later are checked and converted in the same way when a run starts.
 
     Raises:
         SceneError: wrong shapes, no particle, a value that is not finite or beyond 1e100, a mass or a radius not from
@@ -54,7 +54,7 @@ class Particles:
     """
 
     _volume: VolumeEstimate | Callable[[], VolumeEstimate] | None = None
-    # The births of the particles in a run with sources.
+    # The births, in a run with sources.
     births: "Births | None" = None
 
     def __init__(
@@ -76,7 +76,7 @@ class Particles:
         self.spin = None if spin is None else np.array(_spins(spin, radius, len(self)), order="C")
 
     def copy(self) -> "Particles":
-        """The same particles, checked again, with arrays of their own."""
+        """Return the same particles, checked again, in copied arrays."""
         made = Particles(*(getattr(self, name) for name in ARRAYS))
         made._volume = self._volume
         return made
@@ -89,12 +89,12 @@ class Particles:
 
     @volume.setter
     def volume(self, volume: float | Callable[[], VolumeEstimate] | None) -> None:
-        """Set the volume, or a function that returns it with its error when it is first asked for."""
+        """Set the volume, or a function that returns it with its error, called at its first use."""
         self._volume = volume if volume is None or callable(volume) else VolumeEstimate(volume, None)
 
     @property
     def volume_error(self) -> float | None:
-        """The standard error of `volume`: 0 where that is a closed form; None if not known."""
+        """The standard error of `volume`: 0 for a closed form; None if not known."""
         content = self._content()
         return None if content is None else content.error
 
@@ -120,12 +120,12 @@ class Particles:
         return notebook.table(f"{len(self)} particles", rows)
 
     def fastest(self, against: Floats | None = None) -> float:
-        """The largest speed [m/s], against what moves with a velocity (3,) [m/s] if one is given."""
+        """Return the largest speed [m/s], relative to a velocity `against` (3,) [m/s] if given."""
         velocity = self.velocity if against is None else self.velocity - against[:, None]
         return float(np.sqrt(np.fmax.reduce((velocity**2).sum(axis=0), initial=0.0)))
 
     def born(self) -> "Particles":
-        """The particles without rows of NaN, which in a frame of a run with sources are particles not yet born.
+        """Return the particles without rows of NaN, which in a frame of a run with sources are particles not yet born.
 
         The result may be empty.
         """
@@ -143,16 +143,16 @@ class Particles:
         cls, position: Floats, velocity: Floats, mass: Floats, image: NDArray[Any] | None, there: NDArray[np.bool_],
         radius: Floats | None = None, spin: Floats | None = None,
     ) -> "Particles":  # fmt: skip
-        """The particles of a frame, checked; those that are not yet born have positions and velocities of NaN."""
+        """Return the particles of a frame, checked; particles not yet born have positions and velocities of NaN."""
         made = cls(np.where(there, position, 0.0), np.where(there, velocity, 0.0), mass, image, radius, spin)
         made.position[:, ~there] = made.velocity[:, ~there] = np.nan
         return made
 
     @classmethod
     def from_csv(cls, path: str | Path) -> "Particles":
-        """Particles from a CSV file with columns x, y, z, vx, vy, vz and optionally mass, in any order.
+        """Read particles from a CSV file with columns x, y, z, vx, vy, vz and optionally mass, in any order.
 
-        Of balls it has a column radius, and may have wx, wy, wz of their spins. One frame that was exported as .csv is
+        For balls it has a column radius, and may have columns wx, wy, wz of spins. A frame that was exported as .csv is
         such a file; its other columns are not read.
 
         Raises:
@@ -178,13 +178,13 @@ class Particles:
 
 
 class Births(NamedTuple):
-    """The particles of a run that come while it lasts: behind those of the start, in the order in which they come.
+    """The births during a run: particles follow the particles of the start, in the order of their births.
 
     Attributes:
-        time: (N,) of the birth of each particle [s], 0 for particles of the start.
+        time: (N,) the time of the birth of each particle [s], 0 for particles of the start.
         source: (N,) the number of its source, -1 for particles of the start.
         sources: the number of sources.
-        balls: the sources, where they are of balls: then the time is the one at which a birth is due.
+        balls: the sources if they make balls; `time` is then the time at which a birth is due.
     """
 
     time: Floats
@@ -193,12 +193,12 @@ class Births(NamedTuple):
     balls: tuple[Any, ...] = ()
 
     def there(self, moment: float) -> int:
-        """The number of particles, the first ones, that are born by a time [s]."""
+        """Return how many particles, the first ones, are born by a time [s]."""
         return int(np.searchsorted(self.time, moment, side="right"))
 
 
 def _each(name: str, value: ArrayLike, n: int, unit: str) -> Floats:
-    """A number above 0 for each of n particles."""
+    """Return a number above 0 for each of n particles."""
     given = checks.array(name, value)
     if given.ndim > 1 or (given.ndim == 1 and given.size != n):
         raise SceneError(f"{name} must be one number or have shape ({n},), got shape {given.shape}")
@@ -214,7 +214,7 @@ def _each(name: str, value: ArrayLike, n: int, unit: str) -> Floats:
 
 
 def _spins(value: ArrayLike, radius: ArrayLike | None, n: int) -> Floats:
-    """The argument `spin`, checked."""
+    """Return the argument `spin`, checked."""
     if radius is None:
         raise SceneError("spin must be None without a radius, a point does not turn; give a radius too")
     rows = _rows("spin", value)
@@ -224,10 +224,10 @@ def _spins(value: ArrayLike, radius: ArrayLike | None, n: int) -> Floats:
 
 
 def _images(value: ArrayLike, n: int) -> NDArray[np.int64]:
-    """The argument `image`, checked."""
+    """Return the argument `image`, checked."""
     given = checks.array("image", value)
     given = given.reshape(3, 1) if given.ndim == 1 and given.size == 3 else given
-    # Whole numbers beyond this are no floats of their own.
+    # Some whole numbers beyond this are not floats.
     if given.shape != (3, n) or not (np.abs(given) <= 2.0**53).all() or (given != np.floor(given)).any():
         raise SceneError(f"image must be whole numbers of shape (3, {n}), at most 2**53, got {checks.shown(value)}")
     return given.astype(np.int64, order="C")
@@ -247,7 +247,7 @@ def _rows(name: str, value: ArrayLike) -> Floats:
     if not (rows.max() <= checks.LARGEST and rows.min() >= -checks.LARGEST):
         good = (np.abs(rows) <= checks.LARGEST).all(axis=0)
         first = int(np.argmin(good))
-        late = "; of a frame of a run with sources take those that are there: .born()" * bool(
+        late = "; in a frame of a run with sources take the particles that are born: .born()" * bool(
             np.isnan(rows[:, first]).all()
         )
         raise SceneError(
@@ -258,12 +258,12 @@ def _rows(name: str, value: ArrayLike) -> Floats:
 
 
 class TiedParticles:
-    """Particles that are points of bodies: all that the engine of independent particles asks of `Bodies`.
+    """Particles that are points of bodies: the part of `Bodies` that the engine of independent particles needs.
 
     Attributes:
         body: the template of all copies.
-        position: (3, P, n) of every point of every copy [m].
-        velocity: the same shape [m/s].
+        position: (3, P, n) the position of every point of every copy [m].
+        velocity: (3, P, n) the velocity of every point of every copy [m/s].
     """
 
     body: Any
@@ -274,21 +274,21 @@ class TiedParticles:
         return int(self.position.shape[2])
 
     def copy(self) -> Self:
-        """The same bodies as a start, checked again, with arrays of their own."""
+        """Return the same bodies as a start, checked again, in copied arrays."""
         raise NotImplementedError
 
     def contact_points(self) -> Floats:
-        """(3, K, n) the points that can touch walls."""
+        """Return the points (3, K, n) that can touch walls."""
         raise NotImplementedError
 
     def bonds(self) -> NDArray[np.int64]:
-        """(B n, 2) the pairs of points that are tied, as numbers of `particles`."""
+        """Return the tied pairs of points (B n, 2), as numbers of `particles`."""
         raise NotImplementedError
 
     def moved(self, particles: Particles) -> Self:
-        """These bodies where their points, as `particles` gives them, are now."""
+        """Return these bodies at the present places of their points, which are `particles`."""
         raise NotImplementedError
 
     def particles(self) -> Particles:
-        """All points as particles: point p of copy i is number p n + i."""
+        """Return all points as particles: point p of copy i has the number p n + i."""
         raise NotImplementedError

@@ -1,4 +1,4 @@
-"""The scene as users describe it: surfaces and gravity, checked, and the volume that they enclose."""
+"""The scene as users describe it: checked surfaces and gravity, and the enclosed volume."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -29,19 +29,20 @@ from .surfaces.room import lasting, room_bounds
 from .surfaces.surface import UNBOUNDED, Box, Surface, held_opening
 from .surfaces.union import Place
 
-# Gaps are evaluated at this many points at once.
+# The number of points in one evaluation of gaps.
 _BATCH = 4096
-# A slot thinner than this part of the scene's extent does not set the length of steps, which would be lost in the
+# A slot thinner than this part of the extent of a scene does not set the length of steps, which would be lost in
 # round-off of times.
 _THIN = 1e-6
-# Planes nearer to the origin than an atom's nucleus is wide [m] are at it: a scene of them has no extent.
+# Planes nearer to the origin than the width of an atomic nucleus [m] are at it: a scene of such planes has no extent.
 _AT_ORIGIN = 1e-15
-# A step of points that meets images of solids ends at most this part of the shortest period outside of the cell.
+# The largest distance outside of the cell of the end of a step of points that meet images of solids, as a part of the
+# shortest period.
 _REACH_OF_STEPS = 0.05
 
 
 def _surfaces(value: Any) -> tuple[Surface, ...]:
-    """The argument `surfaces`, checked."""
+    """Return the argument `surfaces`, checked."""
     expected = "surfaces such as swarm.Sphere(radius=0.5)"
     given = (value,) if isinstance(value, Surface) else checks.list_of("surfaces", value, expected)
     for i, surface in enumerate(given):
@@ -54,7 +55,7 @@ def _surfaces(value: Any) -> tuple[Surface, ...]:
 
 
 def _end_of(surface: Surface, n: ArrayLike, time: float) -> float:
-    """How far a solid, or a cavity, reaches along a direction at a time [s]; -inf where it has no end there."""
+    """The extent of a solid, or a cavity, along a direction at a time [s]; -inf if it is unbounded there."""
     box = box_of(surface, time, filled=True) if surface.is_solid() else room_bounds((surface,), time)
     along, (low, high) = np.asarray(n), np.array(box)
     end = float(along @ np.where(along > 0.0, high, np.where(along < 0.0, low, 0.0)))
@@ -63,24 +64,24 @@ def _end_of(surface: Surface, n: ArrayLike, time: float) -> float:
 
 @dataclass(frozen=True, init=False, repr=False)
 class Scene:
-    """Rigid surfaces, with admissible sides that intersect in the volume that holds the particles, and gravity.
+    """Rigid surfaces, with admissible sides that intersect in the volume of the particles, and gravity.
 
     Args:
         surfaces: at least one surface for points; balls need none, as in a cell that repeats in every direction.
         gravity: None, or three numbers (gx, gy, gz) [m/s^2], each at most 1e100.
         period: None, or three lengths (Lx, Ly, Lz) [m] of a cell that repeats without end, None for a direction in
-            which it does not: what leaves [0, L) through a face comes back through the other one, and is counted. A
-            solid that reaches over a face is there on the other side too; a cavity is within the cell; and any other
-            surface is the same all along the period, as a plane or an endless cylinder along it, and may move along
-            it. Flights go on over any number of cells where no wall that repeats is in the way.
+            which it does not repeat. A particle that leaves [0, L) through a face comes back through the other face,
+            and is counted. A solid that reaches over a face is present on the other side too; a cavity is within the
+            cell; any other surface is constant along the period, such as a plane or an endless cylinder along it, and
+            may move along it. Flights go on over any number of cells if no wall that repeats is in the way.
         plane: None, or "x", "y" or "z": a billiard of two dimensions, with particles in the plane x, y or z = 0.
             Walls are perpendicular to it. `fill` and all pictures are of the plane. Volumes are areas there, and areas
             are lengths: `Particles.volume` is in m^2, a pressure in N/m.
-        pairs: the `Pairs` of particles with a radius, what two of them do to one another; None: they keep the energy.
+        pairs: the `Pairs` of particles with a radius; None: their impacts on one another conserve the energy.
 
     Raises:
         SceneError: an argument is out of its range, there are more than 24 walls with their images, the surfaces leave
-            no volume, or one of them does not go with the period or is not perpendicular to the plane.
+            no volume, or a surface does not fit the period or is not perpendicular to the plane.
 
     >>> import swarm
     >>> Scene(surfaces=[swarm.Sphere(radius=0.5)], gravity=(0.0, 0.0, -9.81)).size()
@@ -126,7 +127,7 @@ class Scene:
             )
 
     def __repr__(self) -> str:
-        """The call that makes it, omitting defaults, with the first of many surfaces."""
+        """The call that makes the scene, without defaults, with the first of many surfaces."""
         given = {"gravity": self.gravity, "period": self.period, "plane": self.plane, "pairs": self.pairs}
         rest = "".join(f", {name}={value!r}" for name, value in given.items() if value is not None)
         return f"Scene([{', '.join(notebook.shortened(self.surfaces))}]{rest})"
@@ -141,11 +142,11 @@ class Scene:
         return notebook.table("Scene", rows)
 
     def __getstate__(self) -> dict[str, Any]:
-        # Copies make what kernels take anew.
+        # Copies make the arguments of kernels anew.
         return {name: value for name, value in self.__dict__.items() if name not in ("_of_points", "_pieces_by_radius")}
 
     def _require_alone(self) -> None:
-        """Raise a `SceneError` where a foam is not the only surface, or has a period."""
+        """Raise a `SceneError` if a foam is not the only surface, or the scene has a period."""
         foams = [i for i, one in enumerate(self.surfaces) if one.is_foam()]
         if foams and (len(self.surfaces) > 1 or self.period is not None):
             raise SceneError(
@@ -157,7 +158,7 @@ class Scene:
     # --- The volume ----------------------------------------------------------------------------------
 
     def size(self) -> float:
-        """Characteristic length [m]: of the smallest surface, else of the volume; infinite if that is open."""
+        """Return the characteristic length [m]: of the smallest surface, else of the volume; infinite if it is open."""
         smallest = min((surface.size() for surface in self.surfaces), default=math.inf)
         if math.isfinite(smallest):
             return smallest
@@ -165,25 +166,25 @@ class Scene:
         return min(high[k] - low[k] for k in self.axes()) / 2.0
 
     def across(self) -> int | None:
-        """The axis perpendicular to the plane of a scene of two dimensions, or None."""
+        """Return the axis perpendicular to the plane of a scene of two dimensions, or None."""
         return planes.PLANES.get(self.plane)
 
     def axes(self) -> list[int]:
-        """The axes along which particles may move."""
+        """Return the axes along which particles may move."""
         return [k for k in range(3) if k != self.across()]
 
     @once
     def finite_size(self) -> float:
-        """`size`, or the extent of the surfaces where the volume is open, or too thin to be a length of the motion."""
+        """Return `size`, or the extent of the surfaces if the volume is open, or too thin to set a length of steps."""
         size, extent = self.size(), self.extent()
         return size if _THIN * extent < size < math.inf else extent
 
     def wrapped(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Points (3, N) shifted into the cell, and by how many cells (3, N); 0 in a direction without a period."""
+        """Return points (3, N) shifted into the cell, and by how many cells (3, N); 0 along axes without a period."""
         return into_cell(self.period or (None, None, None), checks.array("points", points))
 
     def unwrapped(self, particles: Particles) -> NDArray[np.float64]:
-        """The positions of particles (3, N) without the shift into the cell: position + image * period [m]."""
+        """Return the positions of particles (3, N) without the shift into the cell: position + image * period [m]."""
         if self.period is None or particles.image is None:
             return np.array(particles.position)
         lengths = np.array([length or 0.0 for length in self.period])
@@ -192,17 +193,17 @@ class Scene:
     def gaps(
         self, points: ArrayLike, time: float = 0.0, radius: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
-        """The gap of every surface at points (3, N) and a time [s], shape (surfaces, N); admissible is <= 0.
+        """Return the gap of every surface at points (3, N) and a time [s], shape (surfaces, N); admissible is <= 0.
 
-        The gap of a surface that is not there at that time is minus infinity. With a radius (N,) points are the centres
-        of balls, and the values are those of `distances_outside`.
+        The gap of a surface that is absent at that time is minus infinity. With a radius (N,) points are the centres of
+        balls, and the values are those of `distances_outside`.
         """
         if radius is not None:
             return self.distances_outside(points, time, radius)
         return self._of_each(points, time, self.pieces.images, lambda images, rows: gaps_of(images, rows, time))
 
     def admits(self, points: NDArray[np.float64], radius: NDArray[np.float64] | None = None) -> NDArray[np.bool_]:
-        """Whether each of the points (3, N) is admissible at time 0; where phi is not a number it is not.
+        """Whether each of the points (3, N) is admissible at time 0; a point where phi is NaN is not.
 
         With a radius (N,) points are the centres of balls.
         """
@@ -217,11 +218,11 @@ class Scene:
     def distances_outside(
         self, points: ArrayLike, time: float = 0.0, radius: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
-        """How far points (3, N) are outside of every surface, shape (surfaces, N) [m]; negative inside.
+        """Return how far points (3, N) are outside of every surface, shape (surfaces, N) [m]; negative inside.
 
-        The distance is the gap over the magnitude of its gradient, of first order. It is minus infinity where a surface
-        is not there at that time [s]. With a radius (N,) points are the centres of balls, and the distance is how far
-        they reach outside.
+        The distance is the gap over the magnitude of its gradient, of first order. It is minus infinity for a surface
+        that is absent at that time [s]. With a radius (N,) points are the centres of balls, and the distance is how far
+        the balls reach outside.
         """
         if radius is None:
             return self._of_each(
@@ -233,7 +234,7 @@ class Scene:
     def lost(self, points: NDArray[np.float64], time: float) -> NDArray[np.bool_]:
         """Whether balls with their centres at points (3, N) are beyond walls that they meet from both sides.
 
-        Walls that react are not asked: they are where impacts have moved them.
+        Reacting walls are left out, as impacts have moved them.
         """
         rows = points if self.period is None else into_cell(self.period, points)[0]
         lost = np.zeros(points.shape[1], np.bool_)
@@ -245,7 +246,7 @@ class Scene:
     def _of_each(
         self, points: ArrayLike, time: float, images: Images, values: Callable[[Any, Any], Any]
     ) -> NDArray[np.float64]:
-        """Of every surface the largest of the values of its images at points, (surfaces, N)."""
+        """Return the largest value of the images of every surface at points, (surfaces, N)."""
         rows = checks.array("points", points)
         if self.period is not None:
             rows, _image = into_cell(self.period, rows)
@@ -255,7 +256,7 @@ class Scene:
 
     @once
     def reach_of_steps(self) -> float | None:
-        """How far outside of the cell a step of points may end [m]; None where it meets no images there."""
+        """Return how far outside of the cell a step of points may end [m]; None if no images are there."""
         period = self.period or (None, None, None)
         repeats = [k for k, length in enumerate(period) if length is not None]
         for one in self.surfaces if repeats else ():
@@ -269,20 +270,20 @@ class Scene:
 
     @cached_property
     def _pieces_of_joined_rooms(self) -> Pieces:
-        """The pieces that balls meet: a union of several rooms, or a foam, is one of them."""
+        """The pieces that balls meet: a union of several rooms, or a foam, is one piece."""
         images = [image for images in self.pieces.images for image in images]
         if not any(len(one.rooms) > 1 or one.is_foam() for one in images):
             return self.pieces
-        from .surfaces.balls.joined_rooms import joined_rooms_of  # loaded where balls are
+        from .surfaces.balls.joined_rooms import joined_rooms_of  # loaded only for balls
 
         return pieces_of([joined_rooms_of(one) if len(one.rooms) > 1 or one.is_foam() else one for one in images], None)
 
     def pieces_of_balls(self, largest: float) -> Pieces:
-        """The pieces that balls in the cell meet, with radii up to the largest one [m]."""
+        """Return the pieces that balls in the cell meet, with radii up to `largest` [m]."""
         if self.period is None:
             return self._pieces_of_joined_rooms
         known = self._pieces_by_radius
-        # The pieces of larger balls do as well.
+        # The pieces for larger balls are valid too.
         largest = min((one for one in known if one >= largest), default=largest)
         if largest not in known:
             known[largest] = pieces_of(self.surfaces, self.period, largest)
@@ -291,7 +292,7 @@ class Scene:
     def outside(
         self, points: NDArray[np.float64], distance: float, radius: NDArray[np.float64] | None = None
     ) -> NDArray[np.intp]:
-        """Which of the points (3, N) are farther outside than this distance [m], or where phi is not a number.
+        """Return the numbers of the points (3, N) that are farther outside than a distance [m], or where phi is NaN.
 
         With a radius (N,) points are the centres of balls.
         """
@@ -310,7 +311,7 @@ class Scene:
 
     @once
     def is_open(self) -> bool:
-        """Whether a particle may fly to infinity, at the start or after a wall disappears."""
+        """Whether a particle may fly to infinity, at the start or after a wall becomes absent."""
         at_start = np.isfinite(self.bounds()).all()
         return not (at_start and (not self.has_doors() or np.isfinite(self._bounds_of_lasting(self.surfaces)).all()))
 
@@ -322,17 +323,17 @@ class Scene:
         return not (np.isinf(low) & (pull <= 0.0) | np.isinf(high) & (pull >= 0.0)).any()
 
     def poses(self, time: float) -> list[motions.Pose]:
-        """The pose of every surface at a time [s].
+        """Return the pose of every surface at a time [s].
 
-        A point p of the surface as it is given is then at `center` + `turn` @ (p - `center`) + `shift`; `quaternion` is
-        the rotation `turn` as (w, x, y, z).
+        A point p of the surface as given is then at `center` + `turn` @ (p - `center`) + `shift`; `quaternion` is the
+        rotation `turn` as (w, x, y, z).
         """
         return [motions.pose(surface.motion, time) for surface in self.surfaces]
 
     def open_faces(self, time: float = 0.0) -> NDArray[np.float64]:
-        """Open faces through which gravity pulls no particle back: rows (*n, offset); n.r > offset is outside.
+        """Return open faces through which gravity pulls no particle back: rows (*n, offset); outside is n.r > offset.
 
-        A face is moved out to where no other surface is beyond it that may send a particle back, such as a floor.
+        A face is moved outwards until no other surface beyond it, such as a floor, may send a particle back.
         """
         there = [surface for surface in self.surfaces if surface.is_there(time)]
         faces = [
@@ -341,32 +342,32 @@ class Scene:
             for n, offset in planes_of(surface, surface.open_faces(), time)
         ]
         rows = np.array(faces, dtype=np.float64).reshape(-1, 4)
-        # Particles do not leave through a face across a direction in which the cell repeats.
+        # Particles do not leave through a face across a periodic direction.
         repeats = np.array([length is not None for length in self.period or (None,) * 3])
         rows = rows[(rows[:, :3][:, repeats] == 0.0).all(axis=1)]
         return np.asarray(rows if self.gravity is None else rows[rows[:, :3] @ self.gravity >= 0.0])
 
     def bounds(self, time: float = 0.0) -> Box:
-        """A box (lower, upper) around the admissible volume at a time [s]; infinite where that is open.
+        """Return a box (lower, upper) around the admissible volume at a time [s]; infinite where the volume is open.
 
-        Perpendicular to the plane of a scene of two dimensions it has no width.
+        The box has no width perpendicular to the plane of a scene of two dimensions.
         """
         low, high = self.bounds_of([surface for surface in self.surfaces if surface.is_there(time)], time)
         return tuple(low.tolist()), tuple(high.tolist())
 
     def _bounds_of_lasting(self, surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A box around the volume at the start, by the surfaces alone that are there at all times."""
+        """Return a box around the volume at the start, by those of `surfaces` that are present at all times."""
         return self.bounds_of([surface for surface in surfaces if surface.present is None])
 
     def bounds_of(
         self, surfaces: Sequence[Surface], time: float = 0.0
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A box (lower, upper) around the volume that these surfaces leave, of a cell that repeats or of space."""
+        """Return a box (lower, upper) around the volume that these surfaces leave of the cell, or of space."""
         cell = UNBOUNDED if self.period is None else cell_of(self.period)
         low, high = room_bounds(surfaces, time, cell)
         for k, union in enumerate(surfaces):
             if len(union.rooms) > 1 and not np.isfinite(high - low)[self.axes()].all():
-                # Another surface may close each of its rooms, such as a lid over a cone.
+                # Another surface, such as a lid over a cone, may close each of its rooms.
                 others = [*surfaces[:k], *surfaces[k + 1 :]]
                 boxes = [room_bounds([*others, *lasting(room)], time, cell) for room in union.rooms]
                 low = np.maximum(low, np.min([least for least, _most in boxes], axis=0))
@@ -391,7 +392,7 @@ class Scene:
         )
 
     def extent(self) -> float:
-        """Distance from the origin within which the scene's surfaces lie."""
+        """Return the distance from the origin within which the surfaces of the scene lie [m]."""
         lengths = [length for length in self.period or () if length is not None]
         farthest = max((*(surface.extent() for surface in self.surfaces), *lengths), default=0.0)
         return farthest if farthest > _AT_ORIGIN else 1.0
@@ -399,17 +400,17 @@ class Scene:
     # --- Surfaces, parts and pieces ------------------------------------------------------------------
 
     def has_doors(self) -> bool:
-        """Whether some walls are present, or some openings open, for some times only."""
+        """Whether a wall is present, or an opening open, only at some times."""
         return any(one.present is not None for one in (*self.pieces.each, *self.pieces.open_volumes()))
 
     @cached_property
     def instants(self) -> tuple[float, ...]:
-        """The instants after 0 s at which walls come or go, or openings open or shut [s], in order."""
+        """The instants after 0 s at which walls become present or absent, or openings open or shut [s], in order."""
         return instants_of(one.present for one in (*self.pieces.each, *self.pieces.open_volumes()))
 
     @cached_property
     def parts(self) -> tuple[tuple[int, Place], ...]:
-        """The parts of the unions and intersections of the scene: the number of the surface, and the place in that.
+        """The parts of the unions and intersections of the scene: the number of the surface, and the place in it.
 
         >>> import swarm
         >>> ball = swarm.Sphere(0.5)
@@ -420,27 +421,27 @@ class Scene:
         return tuple((i, place) for i, surface in enumerate(self.surfaces) for place in surface.places_of_parts())
 
     def common_faces(self) -> list[tuple[int, Place, Place]]:
-        """The parts of unions that have a face in common, which is no wall: the surface, and the place of each."""
+        """Return the parts of unions with a common face, which is no wall: the surface, and the place of each part."""
         return [(i, *pair) for i, images in enumerate(self.pieces.images) for pair in images[0].common_places()]
 
     def doorways_of_parts(self) -> dict[tuple[int, Place], list[Surface]]:
-        """The volumes in which walls of a part are open where another room is on their other side."""
+        """Return the volumes in which walls of each part are open because another room is on their other side."""
         found: dict[tuple[int, Place], list[Surface]] = {}
         for i, place, volumes in zip(self.pieces.owners, self.pieces.places, self.pieces.doorways, strict=True):
             found.setdefault((i, place), []).extend(volumes)
         return found
 
     def names_laws(self) -> bool:
-        """Whether a law of a wall is known by its name alone, as from a file that was read without its code."""
+        """Whether only the name of a law is known, as from a file that was read without the code of the law."""
         return any(isinstance(law, str) for piece in self.pieces.each for law in piece.laws)
 
     def pull(self) -> Gravity | None:
-        """Gravity as kernels take it."""
+        """Return gravity as kernels take it."""
         return None if self.gravity is None else Gravity(*self.gravity)
 
     @once
     def moves(self) -> bool:
-        """Whether a surface moves, or may be moved."""
+        """Whether a surface moves, or impacts may move it."""
         return self.reacts() or any(piece.motion is not None for piece in self.pieces.each)
 
     @once
@@ -448,16 +449,16 @@ class Scene:
         """Whether impacts move a surface."""
         return any(surface.reacts() for surface in self.surfaces)
 
-    # --- What kernels take ---------------------------------------------------------------------------
+    # --- The arguments of kernels --------------------------------------------------------------------
 
     def compiled(self, largest: float | None = None, apart: str | None = None) -> CompiledScene:
-        """The scene as kernels take it, for points, or balls with radii up to the largest one [m].
+        """Return the scene as kernels take it, for points, or for balls with radii up to `largest` [m].
 
-        `apart` names the method that does not take listed solids of one kind as a field: then each of them is a wall.
-        In fixed steps of points each field, and each union of several rooms, is one wall too.
+        With `apart`, the name of a method, each listed solid is a wall; without it, solids of one kind are a field. In
+        fixed steps of points each field, and each union of several rooms, is one wall too.
 
         Raises:
-            SceneError: it has too many walls.
+            SceneError: the scene has too many walls.
         """
         order = self._of_points.order
         in_steps = is_in_steps(apart) and (self.reach_of_steps() is not None or order.fields or order.unions)
@@ -470,11 +471,11 @@ class Scene:
         return CompiledScene(self)
 
     def at_frame(self, seen: Mapping[str, Any], k: int) -> "Scene":
-        """The scene with its walls that react held where they are at frame k of the observables of a run."""
+        """Return the scene with its reacting walls held at their poses in frame k of the observables of a run."""
         return self.placed(seen["wall_position"][k], seen["wall_orientation"][k]) if self.reacts() else self
 
     def placed(self, positions: ArrayLike, orientations: ArrayLike) -> "Scene":
-        """The scene with its walls that react held at the `wall_position` and `wall_orientation` of a frame."""
+        """Return the scene with its reacting walls held at the `wall_position` and `wall_orientation` of a frame."""
         surfaces = list(self.surfaces)
         for i, surface in enumerate(surfaces):
             if surface.reacts():

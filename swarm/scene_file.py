@@ -33,13 +33,13 @@ _SCENE = ("gravity", "period", "plane", "pairs")
 _TABLES = (*_SCENE, "particles", "body", "source", "counter", "surface", "method", "run")
 SWEEP = "sweep"
 _SAVED = {"checkpoint": 60.0}
-# Keys of [run] that name a file to write -> the options of `swarm run` for the same file.
+# The keys of [run] that name a file to write -> the options of `swarm run` for the same file.
 OUTPUTS = {"trajectory": "-o", "recording": "--record", "impacts": "--impacts"}
 
 
 @dataclass(frozen=True)
 class ParticlesTable(Validated):
-    """[particles]: their number, speed and mass, or the file that holds them; `fill` and `pack` check the rest."""
+    """[particles]: their number, speed and mass, or their file; `fill` and `pack` check the rest."""
 
     count: Count | None = None
     speed: Magnitude | None = None
@@ -54,7 +54,7 @@ class ParticlesTable(Validated):
     frame: int | None = None
 
     def filled(self, scene: Scene) -> Particles:
-        """The particles of a table without a file."""
+        """Return the particles of a table without a file."""
         if self.fraction is not None:
             return self._packed(scene)
         assert self.count is not None
@@ -86,7 +86,7 @@ class ParticlesTable(Validated):
 
 @dataclass(frozen=True)
 class BodiesFile:
-    """[body]: the file that holds the bodies."""
+    """[body]: the file of the bodies."""
 
     source: str = dataclasses.field(metadata={"key": "from"})
     frame: int | None = None
@@ -105,15 +105,15 @@ class Job:
     named: tuple[Path, ...] = ()
 
     def inputs(self) -> dict[str, Path | None]:
-        """The files that are read, by what they are; none of them may be an output."""
+        """Return the files that are read, by their roles; no output may be one of them."""
         files: dict[str, Path | None] = {"scene file": self.path, "file of the start": self.start_file()}
         files |= {f"file that the scene reads, {one.name}": one for one in self.named}
         return files | {f"module {name} of --plugins": file for name, file in plugins.files().items()}
 
     def require_within(self, names: Iterable[str]) -> None:
-        """Raise a SceneError if one of these outputs of [run] is not in the folder of the file, links followed.
+        """Raise a `SceneError` if one of these outputs of [run] is not in the folder of the file, links followed.
 
-        A scene file may come from someone else: the outputs that it alone names are written beside it only.
+        A scene file may come from someone else, so that the outputs named only in it are written only beside it.
         """
         folder = self.path.parent.resolve()
         for name in names:
@@ -125,22 +125,22 @@ class Job:
                 )
 
     def start_file(self) -> Path | None:
-        """The file of the particles or bodies at the start, or None."""
+        """Return the file of the particles or bodies at the start, or None."""
         name = getattr(self.source, "source", None)
         return None if name is None else self.path.parent / name
 
     def located(self, error: SceneError) -> SceneError:
-        """The error; if it is about a particle of a .csv file, with the row of that."""
+        """Return the error; if it is about a particle of a .csv file, with the row of the particle."""
         file = self.start_file()
         if error.particle is None or file is None or file.suffix.lower() != ".csv":
             return error
         return SceneError(f"{file}, row {row_of(file, error.particle)}: {error}")
 
     def start(self) -> "Particles | Bodies | None":
-        """The particles or bodies at the start, made or read; None where all come from sources.
+        """Return the particles or bodies at the start, made or read; None if all come from sources.
 
         Raises:
-            SceneError: a value of [particles] or [body] is out of its range, or the file it names cannot be used.
+            SceneError: a value of [particles] or [body] is out of its range, or its file cannot be used.
         """
         source, file = self.source, self.start_file()
         if source is None:
@@ -173,20 +173,22 @@ def _read(file: Path, table: ParticlesTable | BodiesFile) -> "Particles | Bodies
             return trajectory.frame(frame)
         born = trajectory.frame(frame).born()
         if not len(born):
-            raise SceneError(f"from: no particle is there at frame {frame} of {file}; choose a later one by frame =")
+            raise SceneError(
+                f"from: no particle is in the scene at frame {frame} of {file}; choose a later one by frame ="
+            )
         return born
 
 
 def read(path: str | Path, plugins: Iterable[str] = ()) -> Job:
-    """The job of a scene file.
+    """Return the job of a scene file.
 
     Args:
         path: the file.
         plugins: modules with laws, surfaces, methods and observables, which the file may name as "module:Name".
 
     Raises:
-        SceneError: the file cannot be read, is not TOML, a key is unknown, missing or out of its range, or it names
-            code of another module.
+        SceneError: the file cannot be read, is not TOML, a key is unknown, missing or out of its range, or the file
+            names code of another module.
     """
     with allowed(plugins):
         return _read_job(Path(path))
@@ -207,9 +209,9 @@ def _read_job(path: Path) -> Job:
 
 
 def text_of(path: Path) -> str:
-    """The text of a scene file; raises a `SceneError` if it cannot be read."""
+    """Return the text of a scene file; raise a `SceneError` if it cannot be read."""
     try:
-        # Editors on Windows begin a file with a byte order mark.
+        # Editors on Windows may begin a file with a byte order mark.
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise SceneError(f"there is no file {path}; expected a scene file (.toml)") from None
@@ -222,23 +224,23 @@ def text_of(path: Path) -> str:
 
 
 def document_of(text: str, path: Path) -> dict[str, Any]:
-    """The tables of a scene file; raises a `SceneError` if its text is not TOML."""
+    """Return the tables of a scene file; raise a `SceneError` if its text is not TOML."""
     try:
         return tomllib.loads(text)
     except RecursionError:
         raise SceneError(f"cannot read the scene file {path}: its arrays or tables are nested too deeply") from None
-    except ValueError as error:  # also a number of too many digits
+    except ValueError as error:  # also for a number with too many digits
         raise SceneError(f"cannot read the scene file {path}: {error}") from error
 
 
 def job_of(document: dict[str, Any], text: str, path: Path, scene: Scene | None = None) -> Job:
-    """The job of the tables of a scene file.
+    """Return the job of the tables of a scene file.
 
     Args:
         document: the tables.
         text: the text of the file.
-        path: its path; the files that it names are relative to its folder.
-        scene: the scene of its tables if it has been made before; None: it is made.
+        path: the path of the file; the files that it names are relative to its folder.
+        scene: the scene of the tables if it has been made before; None to make it.
 
     Raises:
         SceneError: a key is unknown, missing or out of its range; the sentence begins with the key.
@@ -271,7 +273,7 @@ def _start_of(document: dict[str, Any]) -> "ParticlesTable | BodiesFile | Made |
 
 
 def _with_bodies(surfaces: Any, path: Path) -> Any:
-    """The tables of the surfaces, with the arrays of fields that take their solids from a file."""
+    """Return the tables of the surfaces, with the arrays of fields that read their solids from a file."""
     if not isinstance(surfaces, list):
         return surfaces
     return [_bodies_of(table, f"surface[{i}]", path) for i, table in enumerate(surfaces)]
@@ -307,7 +309,7 @@ def _bodies_of(table: Any, where: str, path: Path) -> Any:
 
 
 def _named_files(document: dict[str, Any], path: Path) -> Iterator[Path]:
-    """The existing files that texts of the document name, except outputs; of a trajectory its shards too."""
+    """Yield the existing files that texts of the document name, except outputs, and the shards of trajectories."""
     run = document.get("run")
     read = {key: value for key, value in run.items() if key not in OUTPUTS} if isinstance(run, dict) else {}
     for _key, text in tables.texts_in({**document, "run": read}):
@@ -317,7 +319,7 @@ def _named_files(document: dict[str, Any], path: Path) -> Iterator[Path]:
 
 
 def _run(table: Any, path: Path) -> RunOptions:
-    """The options of [run]: with checkpoints by default, and files relative to the folder of the scene file."""
+    """Return the options of [run], with checkpoints by default, and files relative to the folder of the scene file."""
     if not isinstance(table, dict):
         return tables.convert(table, RunOptions, "run")
     table, own = {**_SAVED, **table}, table.get("observables")

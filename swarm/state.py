@@ -1,4 +1,4 @@
-"""The arrays that kernels advance, one entry a particle."""
+"""The arrays that kernels advance, with one entry for each particle."""
 
 import math
 from typing import Any, NamedTuple
@@ -11,14 +11,14 @@ Indices = NDArray[np.int64]
 
 
 class Multipliers(NamedTuple):
-    """Statistics of each particle's Uzawa loops since the start, from methods with multipliers.
+    """The statistics of the Uzawa loops of each particle since the start, for methods with multipliers.
 
     Attributes:
-        sweeps: (N,) sweeps of all its contact steps together.
+        sweeps: (N,) sweeps of all contact steps together.
         contacts: (N,) contact steps.
         unconverged: (N,) contact steps with a loop that did not reach the tolerance.
         stored_energy: (N,) the largest V that a loop left [J].
-        remaining: (N,) the rest of the frame, in the method's unit, where a loop failed.
+        remaining: (N,) the rest of the frame, in the unit of the method, where a loop failed.
     """
 
     sweeps: NDArray[np.int64]
@@ -29,19 +29,19 @@ class Multipliers(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """The lasting contacts of each particle, of methods in which a particle may slide.
+    """The lasting contacts of each particle, for methods in which a particle may slide.
 
     Attributes:
-        phase: (N,) int8, how it begins the next frame: in flight, along one wall or two, or at rest (ARRIVED).
-        walls: (2, N) the walls that hold it, as numbers; -1 for none. Two are an edge.
-        met: (N,) the wall at which it is to be decided what becomes of it.
-        step: (N,) its next sliding step [s]; 0 where the walls decide.
-        keep: (N,) the speed across its walls that it has again when it leaves them [m/s].
-        remaining: (N,) what is left of the frame where it goes from flight to contact or back [s]; 0 at its ends.
-        events: (2, N) what was left when it met a wall last, and how often it has met one since without moving on.
-        short_steps: (N,) of this frame, where several walls hold it or a cusp.
-        load: (walls, N) what each wall carries of it at rest, per mass [m/s^2].
-        sliding: (N,) how long it has slid, or rested, since the start [s].
+        phase: (N,) int8, the state at the start of a frame: in flight, along one or two walls, or at rest (ARRIVED).
+        walls: (2, N) the numbers of the walls that hold the particle; -1 for no wall. Two walls are an edge.
+        met: (N,) the wall at which the next phase of the particle is to be decided.
+        step: (N,) the next sliding step [s]; 0 if the walls decide.
+        keep: (N,) the speed across the walls that the particle has again when it leaves them [m/s].
+        remaining: (N,) the rest of the frame at a change from flight to contact or back [s]; 0 at the ends of frames.
+        events: (2, N) the rest of the frame at the last hit on a wall, and the hits since then without a move.
+        short_steps: (N,) the short steps in this frame, where several walls or a cusp hold the particle.
+        load: (walls, N) the force of each wall on a particle at rest, per mass [m/s^2].
+        sliding: (N,) the time of sliding, or rest, since the start [s].
     """
 
     phase: NDArray[np.int8]
@@ -60,8 +60,8 @@ class Absorbed(NamedTuple):
     """The particles that walls have absorbed.
 
     Attributes:
-        time: (N,) when each was [s], NaN of those that are not.
-        wall: (N,) int32, the number of that wall in the scene; -1 of those that are not.
+        time: (N,) the time of the absorption [s], NaN for other particles.
+        wall: (N,) int32, the number of the wall in the scene, -1 for other particles.
     """
 
     time: Floats
@@ -76,9 +76,9 @@ class Crossed(NamedTuple):
     """The crossings of counters by each particle since the start.
 
     Attributes:
-        side: (counters, N) int8, 1 where it is out of the admissible side of a counter.
-        number: (2 counters, N) crossings of each counter, out of that side and back.
-        sums: (10 counters, N) of these the momentum [kg m/s], the kinetic energy [J], and the slowness 1/|v_n| [s/m].
+        side: (counters, N) int8, 1 for a particle out of the admissible side of a counter.
+        number: (2 counters, N) crossings of each counter, out of the admissible side and back.
+        sums: (10 counters, N) sums over crossings: momentum [kg m/s], kinetic energy [J] and slowness 1/|v_n| [s/m].
     """
 
     side: NDArray[np.int8]
@@ -86,7 +86,7 @@ class Crossed(NamedTuple):
     sums: Floats
 
 
-# Counts of 32 bits begin anew from so many on, and how often is counted beside another number, which is below `BELOW`.
+# Counts of 32 bits begin anew at `ROUND`. The number of rounds is stored together with a number below `BELOW`.
 ROUND, BELOW = 2**30, 8
 
 
@@ -95,9 +95,9 @@ class Balls(NamedTuple):
 
     Attributes:
         radius: (N,) [m].
-        collisions: (N,) whole numbers, with other particles since the start; each counts for both.
+        collisions: (N,) whole numbers, the collisions with other particles since the start; each counts for both.
         virial: (1,) the sum of r_ij . J_ij over all collisions since the start [J s].
-        spin: (3, N) angular velocity [rad/s], or None where nothing turns them.
+        spin: (3, N) the angular velocity [rad/s], or None if nothing turns the balls.
         rounds: (N,) `BELOW` times how often `collisions` has begun anew after `ROUND`, plus another number; or None.
     """
 
@@ -108,21 +108,21 @@ class Balls(NamedTuple):
     rounds: NDArray[Any] | None = None
 
     def all_collisions(self) -> NDArray[np.int64]:
-        """`collisions` (N,), also where these have begun anew."""
+        """Return the collisions (N,), with those before `collisions` has begun anew."""
         found = self.collisions.astype(np.int64, copy=False)
         if self.rounds is not None and self.rounds.max(initial=0) >= BELOW:
             found += ROUND * (self.rounds // BELOW).astype(np.int64)
         return found
 
     def sum_of_collisions(self, n: int) -> int:
-        """The sum of `all_collisions` of the first n balls, without an array of them: these would be 8 bytes a ball."""
+        """Return the sum of `all_collisions` of the first n balls, without the array, which has 8 bytes a ball."""
         rounds, found = self.rounds, int(self.collisions[:n].sum())
         if rounds is not None and rounds[:n].max(initial=0) >= BELOW:
             found += ROUND * int((rounds[:n] // BELOW).sum())
         return found
 
     def of(self, some: NDArray[np.bool_], n: int) -> "Balls":
-        """That of some of n balls."""
+        """Return the state of some of n balls."""
         return Balls(*(_of(value, some, n) for value in self))._replace(virial=self.virial)
 
 
@@ -135,41 +135,41 @@ class State(NamedTuple):
     position: Floats  # (3, N)
     velocity: Floats  # (3, N)
     mass: Floats  # (N,)
-    energy: Floats  # (N,) total energy per mass [J/kg]: that of the start, less what was dissipated
-    inverse_scale: Floats  # (N,) 1/energy scale per mass, what energy errors are relative to
+    energy: Floats  # (N,) total energy per mass [J/kg]: that of the start, minus the energy dissipated
+    inverse_scale: Floats  # (N,) 1/energy scale per mass, the factor that makes energy errors relative
     impacts: NDArray[np.int64]  # (N,) since the start
-    impulse: Floats  # (walls, N) normal impulse since the start [N s], then (walls, N) the work of walls that move [J]
+    impulse: Floats  # (walls, N) normal impulse since the start [N s], then (walls, N) the work of moving walls [J]
     dissipated: Floats  # (N,) energy lost since the start [J]; empty if no wall dissipates
     multipliers: Multipliers | None
     contacts: Contacts | None = None
-    heat: Floats | None = None  # (walls, N) energy that thermal walls gave since the start [J]; None without
-    # Where the scene repeats: the energy is that of the position in the cell, and changes with the image.
-    image: NDArray[np.int64] | None = None  # (3, N) how many cells away it is
-    carry: Floats | None = None  # (N,) what is lost of the energy by round-off at these changes
+    heat: Floats | None = None  # (walls, N) energy that thermal walls gave since the start [J]; None without these
+    # In a periodic scene the energy is that of the position in the cell, and changes with the image.
+    image: NDArray[np.int64] | None = None  # (3, N) the cell of each particle
+    carry: Floats | None = None  # (N,) the round-off of the energy lost at these changes
     period: Any = None  # `Period` of the cell
-    # Where a wall has openings:
-    escape_time: Floats | None = None  # (N,) when each has passed one [s], NaN of those that are inside
+    # If a wall has openings:
+    escape_time: Floats | None = None  # (N,) the time at which each passed an opening [s], NaN for particles inside
     openings: Any = None  # None, or each `Opening` of the walls
-    # Where particles come during the run, or wait on a wall:
-    starts: Floats | None = None  # (N,) the time from which each flies [s]
-    # Where a wall may absorb any, as in `Absorbed`:
+    # If particles are born during the run, or wait on a wall:
+    starts: Floats | None = None  # (N,) the time from which each particle flies [s]
+    # If a wall may absorb particles, as in `Absorbed`:
     absorbed_time: Floats | None = None
     absorbed_wall: NDArray[np.int32] | None = None
 
-    crossed: Crossed | None = None  # where there are counters
-    # Where balls come during the run:
-    born_time: Floats | None = None  # (N,) when each was born [s], NaN of those that are not
-    balls: Balls | None = None  # where particles have a radius
-    # Where particles come during the run, and no contact lasts from pass to pass:
-    late: Floats | None = None  # (N,) what is left of the frame, in the method's unit, of those that start within it
+    crossed: Crossed | None = None  # if the run has counters
+    # If balls are born during the run:
+    born_time: Floats | None = None  # (N,) the time of birth [s], NaN before it
+    balls: Balls | None = None  # if particles have a radius
+    # If particles are born during the run, and no contact lasts from pass to pass:
+    late: Floats | None = None  # (N,) the rest of the frame, in the unit of the method, for particles that start in it
 
-    # Where contacts take time, and laws of walls act at their ends:
+    # If contacts take time, and laws of walls act at their ends:
     pressed: Floats | None = None  # (walls, N) the impulse of each contact since friction last acted, per mass [m/s]
-    rubbed: Floats | None = None  # (walls, N) what it has had before that, in the same contact, per mass [m/s]
+    rubbed: Floats | None = None  # (walls, N) the impulse of the same contact before that, per mass [m/s]
 
     @property
     def absorbed(self) -> Any:
-        """`Absorbed`, or None where no wall absorbs any."""
+        """The `Absorbed`, or None if no wall absorbs particles."""
         time, wall = self.absorbed_time, self.absorbed_wall
         return None if time is None or wall is None else Absorbed(time, wall)
 
@@ -189,7 +189,7 @@ class State(NamedTuple):
         return None if self.balls is None else self.balls.all_collisions()
 
     def having(self, **arrays: NDArray[Any]) -> "State":
-        """The state with other arrays, also in place of those of balls."""
+        """Return the state with other arrays, also of balls."""
         mine: dict[str, Any] = {name: array for name, array in arrays.items() if name in self._fields}
         balls: dict[str, Any] = {name: array for name, array in arrays.items() if name not in mine}
         if "collisions" in balls:
@@ -197,13 +197,13 @@ class State(NamedTuple):
         return self._replace(**mine, balls=None if self.balls is None else self.balls._replace(**balls))
 
     def of(self, some: NDArray[np.bool_]) -> "State":
-        """The state of some of the particles (N,), copied."""
+        """Return the state of some of the particles (N,), copied."""
         n, balls = self.mass.size, self.balls
         made = self._replace(**{name: _of(value, some, n) for name, value in self._asdict().items()})
         return made._replace(balls=None if balls is None else balls.of(some, n))
 
     def gone(self) -> NDArray[np.bool_]:
-        """(N,) whether each has escaped or was absorbed: where it is then it stays, whatever the walls do."""
+        """Whether each particle has escaped or was absorbed (N,): it then stays in place, whatever the walls do."""
         found = np.zeros(self.mass.size, np.bool_)
         for time in (self.escape_time, self.absorbed_time):
             if time is not None:
@@ -212,7 +212,7 @@ class State(NamedTuple):
 
 
 def none_left(n: int, opens: bool, absorbs: bool) -> dict[str, Any]:
-    """The fields of n particles of which none has left: through an opening where walls have any, or into a wall.
+    """Return the fields of n particles before any has left through an opening (if `opens`) or into a wall.
 
     >>> sorted(name for name, array in none_left(2, False, True).items() if array is not None)
     ['absorbed_time', 'absorbed_wall']
@@ -230,7 +230,7 @@ def _of(value: Any, some: NDArray[np.bool_], n: int) -> Any:
 
 
 def is_gone(state, i):
-    """Whether particle i has passed an opening, or was absorbed, and is no more among the walls."""
+    """Whether particle i has left the walls: it has passed an opening, or was absorbed."""
     escaped = False if state.escape_time is None else not math.isnan(state.escape_time[i])
     if state.absorbed is None:
         return escaped

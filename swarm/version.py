@@ -1,3 +1,3 @@
-"""The version, where packaging and files read it without importing the engine."""
+"""The version, in a module that packaging and files can import without the engine."""
 
 VERSION = "0.1.0"

@@ -1,4 +1,4 @@
-"""The views of a run: the module of each, which is imported when the view is used."""
+"""The views of a run, each with a module that is imported when the view is used."""
 
 import importlib
 from types import ModuleType
@@ -8,12 +8,12 @@ from .common.extras import needed_by
 
 
 class View(NamedTuple):
-    """A module that shows a run, and what it needs.
+    """A module that shows a run, and the packages that it needs.
 
     Attributes:
-        module: its name, relative to this package.
-        what: it shows a run as, for errors.
-        extra: the packages that it needs, see `extras.PACKAGES`; None: none.
+        module: the name of the module, relative to this package.
+        what: the form in which it shows a run, for errors.
+        extra: the packages that it needs, see `extras.PACKAGES`; None for no packages.
     """
 
     module: str
@@ -38,10 +38,10 @@ VIEWS = {
 
 
 def view(name: str) -> ModuleType:
-    """The module of a view.
+    """Return the module of a view.
 
     Raises:
-        SceneError: a package that it needs is not installed.
+        SceneError: a package that the view needs is not installed.
 
     >>> view("plot").__name__
     'swarm.pictures.plots'

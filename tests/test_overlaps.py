@@ -1,4 +1,4 @@
-"""Cavities that overlap only in part: the run says that what they have in common is meant."""
+"""Cavities that overlap only in part: the run says that their common part is meant."""
 
 import logging
 from dataclasses import replace
@@ -13,7 +13,7 @@ from swarm import scene_file
 from swarm.run.preflight.hints import warn_of_overlap, warn_of_walls_in_one_place
 
 SENTENCE = (
-    "surfaces[0] (Sphere) and surfaces[2] (Box) overlap only in part: particles are kept in what they have in common; "
+    "surfaces[0] (Sphere) and surfaces[2] (Box) overlap only in part: particles stay in their common part; "
     'a vessel of both is one surface, swarm.Union([...]), in a scene file kind = "union"'
 )
 BALL = swarm.Sphere(0.5)

@@ -72,7 +72,7 @@ def test_walls_are_as_they_are_at_the_start():
     packed = swarm.pack(swarm.Scene([shaken]), 12, fraction=0.203, seed=1)
     assert np.array_equal(packed.position, swarm.pack(BOX, 12, fraction=0.203, seed=1).position)
     away = swarm.Box((0.5, 0.5, 0.5), motion=swarm.Path((-1.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.2))))
-    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].motion must leave the wall at 0 s where it is given"):
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].motion must leave the wall at its given place at 0 s"):
         swarm.pack(swarm.Scene([away]), 10, fraction=0.3)
 
 
@@ -94,7 +94,7 @@ def test_walls_are_as_they_are_at_the_start():
         ({"n": 1, "radius": 0.6}, "radius must leave a place within the walls, which are 1 m apart along x, got 0.6 m"),
         (
             {"radius": 0.4, "fraction": 0.1},
-            "fraction must be that of one ball of the radius 0.4 m or more, 0.2681, got",
+            "fraction must be at least 0.2681, that of one ball of the radius 0.4 m, got",
         ),
         ({"n": 10, "radius": -1.0}, "radius must be a finite number above 0, got -1 for particle 0"),
         ({"n": 0, "radius": 0.1}, "n must be 1 or more, got 0"),

@@ -304,7 +304,7 @@ def test_a_trajectory_of_a_version_that_stored_no_start_is_not_taken_for_complet
     run(tmp_path / "run.h5")
     with h5py.File(tmp_path / "run.h5", "r+") as file:
         del file["parameters/start"]
-    with pytest.raises(swarm.SceneError, match=r"run\.h5 must say of which start it is") as caught:
+    with pytest.raises(swarm.SceneError, match=r"run\.h5 must have the digest of its start") as caught:
         run(tmp_path / "run.h5", resume=True)
     assert not isinstance(caught.value, swarm.CompleteError)
 

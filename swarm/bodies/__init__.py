@@ -1,1 +1,1 @@
-"""Bodies: several points tied together. What they are, how they are made, and where they start."""
+"""Bodies: several points tied together. Their description, their construction, and their start."""

@@ -1,4 +1,4 @@
-"""Runs of bodies, checked before they start."""
+"""Checks of runs of bodies before they start."""
 
 import logging
 import math
@@ -26,17 +26,17 @@ from .body import Body, squares_between
 from .copies import Bodies
 
 _LOG = logging.getLogger("swarm")
-# A body that turns farther in a step [rad], and how far it may.
+# The turn of a body in a step above which there is a warning, and the proposed turn [rad].
 _FAR_TURN, _GOOD_TURN = 1.0, 0.3
 
-# What a solid may enter by, between contact points, in half thicknesses of it or of the body, whichever is thinner.
+# The depth by which a solid may enter between contact points, in half thicknesses of it or of the body, if thinner.
 _ENTERS = 0.25
-# Points of a lattice of triangles with sides of 1 leave no gap of a larger radius; it is found to so much.
+# The radius of the gaps in a lattice of triangles with sides of 1, times the accuracy with which gaps are found.
 _GAP = 1.25 / math.sqrt(3.0)
 
 
 def task_of(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> Task:
-    """The run of bodies, checked, with its own copy of them.
+    """Return the checked run of bodies, with its own copy of them.
 
     Raises:
         SceneError: the arguments do not go together.
@@ -70,7 +70,7 @@ def task_of(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -
 
 
 def _require_steps(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -> None:
-    """Raise a `SceneError` where a step of soft bodies does not fit the scene or the frames."""
+    """Raise a `SceneError` if a step of soft bodies does not fit the scene or the frames."""
     if not isinstance(method, Penalty):
         return
     if len(bodies.body.contacts):
@@ -83,7 +83,7 @@ def _require_steps(scene: Scene, bodies: Bodies, method: Method, options: RunOpt
 
 
 def _require_in_plane(scene: Scene, body: Body, points: Particles) -> None:
-    """Raise a `SceneError` where a body does not stay in the plane of a scene by itself."""
+    """Raise a `SceneError` where a body would leave the plane of a scene."""
     if scene.plane is None:
         return
     led = any(motion is not None for motion in body.anchors.values())
@@ -96,7 +96,7 @@ def _require_in_plane(scene: Scene, body: Body, points: Particles) -> None:
 
 
 def _warn_of_turns(bodies: Bodies, dt: float) -> None:
-    """Warn where a tie of a body turns so far in a step that the step is cut, or says little."""
+    """Warn where a tie of a body turns so far in a step that the step is cut, or inaccurate."""
     ends, r, v = bodies.body.links, bodies.position, bodies.velocity
     if not len(ends):
         return
@@ -104,14 +104,14 @@ def _warn_of_turns(bodies: Bodies, dt: float) -> None:
     link, copy = np.unravel_index(int(np.argmax(turns)), turns.shape)
     if turns[link, copy] > _FAR_TURN:
         _LOG.warning(
-            "body %d turns by %.2g rad in a step of %g s (links[%d]): its steps will be cut, which is slow, or say "
-            "little of its motion; use dt = %.1g s or less",
+            "body %d turns by %.2g rad in a step of %g s (links[%d]): its steps will be cut, which is slow, or "
+            "inaccurate; use dt = %.1g s or less",
             copy, turns[link, copy], dt, link, _GOOD_TURN * dt / turns[link, copy],
         )  # fmt: skip
 
 
 def warn_of_passing(scene: Scene, body: Body) -> None:
-    """Warn where a solid can enter a face of the body, or pass it, without touching a contact point."""
+    """Warn if a solid can enter a face of the body, or pass through it, without touching a contact point."""
     solids = [(i, surface) for i, surface in enumerate(scene.surfaces) if _is_solid(surface)]
     if not solids or not len(body.faces):
         return
@@ -121,7 +121,7 @@ def warn_of_passing(scene: Scene, body: Body) -> None:
     allowed = _ENTERS * min(size, thin)
     if depth <= allowed:
         return
-    # The gap at which it would enter by what is allowed.
+    # The gap at which the solid would enter by the allowed depth.
     wanted = allowed if surface.has_edges else math.sqrt(allowed * (2.0 * size - allowed))
     what = "pass through the body" if gap >= size else f"enter the body by {depth:.2g} m"
     _LOG.warning(
@@ -132,12 +132,12 @@ def warn_of_passing(scene: Scene, body: Body) -> None:
 
 
 def _is_solid(surface: Surface) -> bool:
-    # Between two parallel planes a body has all of its contact points on one side.
+    # A slab cannot lie between contact points of a body: they are all on one side of it.
     return surface.is_solid() and not isinstance(surface, Slab)
 
 
 def _depth(surface: Surface, gap: float) -> float:
-    """By how much a solid enters a plane between points that leave a circle of radius `gap` free [m]."""
+    """The depth to which a solid enters a plane between points that leave a circle of radius `gap` free [m]."""
     size = surface.size()
     if gap >= size:
         return math.inf
@@ -145,6 +145,6 @@ def _depth(surface: Surface, gap: float) -> float:
 
 
 def _rounded(value: float) -> float:
-    """Down to one digit."""
+    """Return `value` rounded down to one digit."""
     unit = 10.0 ** math.floor(math.log10(value))
     return math.floor(value / unit) * unit

@@ -5,12 +5,12 @@ import numpy as np
 from ..kernel.limits import EPSILON
 from ..state import Floats
 
-# Jacobi's sweeps over a matrix of three rows: they converge quadratically, and need six at most.
+# The most sweeps of Jacobi's method over a matrix of three rows; six suffice, as convergence is quadratic.
 _SWEEPS = 12
 
 
 def product(rows: Floats, matrix: Floats) -> Floats:
-    """(m, n) the product of `rows` (m, k) and a matrix (k, n); entries of `rows` that are 0 take no time."""
+    """Return the product (m, n) of `rows` (m, k) and a matrix (k, n); entries of `rows` that are 0 take no time."""
     found = np.zeros((len(rows), matrix.shape[1]))
     for k, entries in enumerate(rows.T):
         some = np.flatnonzero(entries)
@@ -19,20 +19,20 @@ def product(rows: Floats, matrix: Floats) -> Floats:
 
 
 def determinants(matrices: Floats) -> Floats:
-    """(...) a.(b x c) of the rows of matrices (..., 3, 3)."""
+    """Return the determinants (...) of matrices (..., 3, 3), a.(b x c) of their rows."""
     a, b, c = (matrices[..., k, :] for k in range(3))
     return np.asarray((a * np.cross(b, c)).sum(axis=-1))
 
 
 def modes_of_three(matrix: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues (3,), and eigenvectors in the columns of (3, 3), of a symmetric matrix: Jacobi's rotations."""
+    """Return the eigenvalues (3,) and eigenvectors, columns of (3, 3), of a symmetric matrix, by Jacobi's rotations."""
     rest, axes, least = matrix.copy(), np.eye(3), 0.25 * EPSILON * np.abs(matrix).max()
     for _sweep in range(_SWEEPS):
         for p, q in ((0, 1), (0, 2), (1, 2)):
-            # What is below round-off does not turn: each turn costs the axes a digit's last bit.
+            # An entry below round-off needs no rotation; each rotation costs the axes a last bit.
             if abs(rest[p, q]) <= least:
                 continue
-            # tan of the angle that makes the entry 0, of its two the smaller
+            # The smaller of the two tangents of angles that make the entry 0.
             apart, twice = rest[q, q] - rest[p, p], 2.0 * rest[p, q]
             tangent = twice / (apart + np.copysign(np.sqrt(apart * apart + twice * twice), apart))
             cosine = 1.0 / np.sqrt(1.0 + tangent * tangent)
@@ -47,17 +47,17 @@ def modes_of_three(matrix: Floats) -> tuple[Floats, Floats]:
 
 
 def inverse(matrix: Floats) -> Floats:
-    """The inverse of a symmetric, positive definite matrix; of a diagonal one it is exact."""
-    # In powers of two, so that nothing is rounded.
+    """Return the inverse of a symmetric, positive definite matrix; the inverse of a diagonal matrix is exact."""
+    # The units are powers of two, so that scaling rounds nothing.
     unit = np.ldexp(1.0, -(np.frexp(np.diagonal(matrix))[1] // 2))
     scaled = unit[:, None] * matrix * unit
     return np.asarray(unit[:, None] * solved(scaled[:, :, None], np.eye(len(matrix))) * unit)
 
 
 def solved(system: Floats, wanted: Floats) -> Floats:
-    """The x (m, n) of n symmetric systems (m, m, n), or of one; 0 in a row that follows from those before.
+    """Return the solutions (m, n) of n symmetric systems (m, m, n), or of one (m, m, 1); 0 in a dependent row.
 
-    Their diagonals are about 1.
+    The diagonals of the systems are about 1.
     """
     upper, x, rows = system.copy(), wanted.copy(), len(wanted)
     least = 8.0 * rows * EPSILON

@@ -1,6 +1,6 @@
-"""Births of bodies while a run lasts: a birth has room where the ball around the body, about its centre, has room.
+"""Births of bodies during a run: a body has room at its birth if the ball around it, about its centre, has room.
 
-Each is turned at random, uniform among all orientations, by its number alone: the same bits for any threads.
+Each body is turned at random, uniform among all orientations, by its number alone: the same bits for any threads.
 """
 
 from dataclasses import replace
@@ -22,25 +22,25 @@ from ..surfaces.rotation import matrices
 from .body import Body
 from .copies import Bodies
 
-# Stream of the orientations of a source.
+# The stream of the orientations of a source.
 _TURNS = 5
-# Where no bodies are: they do not meet one another.
+# No bodies are in the way, as bodies do not meet one another.
 _NONE = There(np.zeros((3, 0)), np.zeros((3, 0)), np.zeros(0))
 
 
 def reach_of(body: Body) -> float:
-    """How far its points are from its centre of mass at most [m]."""
+    """The largest distance of a point of a body from its centre of mass [m]."""
     return float(np.sqrt((_arms(body) ** 2).sum(axis=0)).max())
 
 
 def _arms(body: Body) -> Floats:
-    """(3, P) from the centre of mass to each point."""
+    """The vectors (3, P) from the centre of mass to each point."""
     points = body.points.T[:, :, None]
     return np.asarray((points - body.center_of(points)[:, None])[:, :, 0])
 
 
 def with_born(scene: Scene, bodies: Bodies, sources: tuple[Source, ...], seed: int, until: float) -> Bodies:
-    """The bodies of a run with sources, behind those of the start those that come.
+    """Return the bodies of a run with sources: the bodies of the start, then the bodies to be born.
 
     Raises:
         SceneError: a source does not fit the bodies or the scene.
@@ -79,7 +79,7 @@ def with_born(scene: Scene, bodies: Bodies, sources: tuple[Source, ...], seed: i
 
 
 def _centers(bodies: Bodies) -> Particles:
-    """The balls around bodies."""
+    """Return the balls around bodies."""
     body = bodies.body
     return Particles(
         bodies.centers(), body.center_of(bodies.velocity), body.mass_matrix.sum(), bodies.image, reach_of(body)
@@ -87,11 +87,11 @@ def _centers(bodies: Bodies) -> Particles:
 
 
 def _turn(seed: int, k: int, number: int, across: int | None) -> Floats:
-    """A rotation as a quaternion (4,), uniform among all, in a plane about its normal, of the birth with a number."""
+    """Return the uniform random quaternion (4,) of the birth with a number; in a plane, about its normal."""
     q = stream(seed, k, _TURNS, number).standard_normal(4)
     if across is not None:
         q[[1 + axis for axis in along(across)]] = 0.0
-    # Not by BLAS: its last bit depends on the processor.
+    # BLAS is not used, as its last bit depends on the processor.
     return np.asarray(q / np.sqrt((q**2).sum()))
 
 
@@ -101,21 +101,21 @@ class BodyFeed(Feed):
     Args:
         scene: the vessel.
         bodies: all copies, with their births.
-        seed: of the run.
-        energy: of copies by their positions and velocities (3, P, n), (n,) [J].
+        seed: the seed of the run.
+        energy: the function that returns the energies (n,) [J] of positions and velocities (3, P, n).
     """
 
     def __init__(self, scene: Scene, bodies: Bodies, seed: int, energy: Any) -> None:
         balls = _centers(bodies)
         balls.births = bodies.births
         super().__init__(scene, balls, seed)
-        # Of each copy how its points are, and move, about its centre.
+        # The places and velocities of the points of each copy relative to its centre.
         self._arms = bodies.position - balls.position[:, None]
         self._slips = bodies.velocity - balls.velocity[:, None]
         self._energy_of = energy
 
     def until(self, moment: float) -> list[tuple[float, NDArray[np.int64], Floats, Floats]]:
-        """The births up to a moment [s]: the time, the numbers of copies, their positions and velocities (3, P, n)."""
+        """Return the births up to a moment [s]: the time, numbers of copies, positions and velocities (3, P, n)."""
         made = []
         while (due := self.next()) <= moment:
             born = self.come(due, _NONE)

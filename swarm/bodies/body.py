@@ -1,11 +1,11 @@
 """Bodies: base points with masses, the ties between them, and the points that touch walls.
 
-A body is P base points r_p with a constant mass matrix M (P, P), times the identity of R^3. Pairs of them are tied by
-    links      |r_i - r_j| stays as it is,
+A body has P base points r_p with a constant mass matrix M (P, P), times the identity of R^3. Pairs of them are tied by
+    links      |r_i - r_j| is constant,
     springs    V = k (|r_i - r_j| - l)^2/2,
-    a strain   V = (s - s0).K (s - s0)/2 of the squares s of the lengths of edges: an elastic solid made of tetrahedra
+    a strain   V = (s - s0).K (s - s0)/2 of the squares s of the lengths of edges. An elastic solid made of tetrahedra
                of Saint Venant and Kirchhoff has exactly this energy, because the strain of each is linear in its s.
-A contact point is a fixed linear combination sum b_p r_p, so a polyhedron of a hundred corners still has four points.
+A contact point is a fixed linear combination sum b_p r_p, so a polyhedron with a hundred corners has four base points.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,7 +29,7 @@ class Strain:
 
     Args:
         edges: (E, 2) pairs of points, E at least 1.
-        rest: (E,) s0, the squares of their lengths without stress, above 0 [m^2].
+        rest: (E,) s0, the squares of the lengths of edges without stress, above 0 [m^2].
         stiffness: (E, E) K, symmetric and without negative eigenvalues [N/m^3].
 
     Raises:
@@ -57,7 +57,7 @@ class Strain:
         checks.assign(self, edges=edges, rest=rest, stiffness=stiffness)
 
     def energy(self, points: Floats) -> Floats:
-        """V [J] of points (3, P), or of n copies (3, P, n)."""
+        """The energy V [J] of points (3, P), or of n copies (3, P, n)."""
         rows = np.asarray(points, dtype=np.float64)
         shape = (-1,) + (1,) * (rows.ndim - 2)
         excess = squares_between(rows, self.edges) - self.rest.reshape(shape)
@@ -65,7 +65,7 @@ class Strain:
 
 
 def squares_between(rows: Floats, pairs: Pairs) -> Floats:
-    """The squares of the differences (L, ...) of rows (3, P, ...) between two points, for all pairs of points."""
+    """The squared differences (L, ...) of the vectors (3, P, ...) at the two points of each pair (L, 2)."""
     return np.asarray(((rows[:, pairs[:, 0]] - rows[:, pairs[:, 1]]) ** 2).sum(axis=0))
 
 
@@ -81,18 +81,18 @@ class Body:
     """Points tied together: the template of all copies that `place` makes.
 
     Args:
-        points: (P, 3) base points, as they are at rest [m].
-        mass: one number or (P,) [kg], above 0; or
+        points: (P, 3) base points in the body at rest [m].
+        mass: one number or (P,) [kg], above 0; either this or `mass_matrix` is given.
         mass_matrix: (P, P) [kg], symmetric and positive definite.
         links: pairs (i, j) of points at a distance that never changes; no link may follow from the others.
         springs: (i, j, stiffness above 0 [N/m], rest length 0 or more [m]).
-        contacts: what can touch a wall: numbers of points, or rows (K, P) of coefficients that add up to 1; None: every
-            point that is not anchored.
+        contacts: the points that can touch a wall: numbers of points, or rows (K, P) of coefficients that add up to 1;
+            None: every point that is not anchored.
         strain: elastic energy of edges, as `elastic` makes it.
-        anchors: number of a point -> None, fixed in space, or a Translation, Oscillation or Rotation that leads it.
-        guides: (number of a point, surface without edges): the point stays on that surface, and starts on it.
+        anchors: number of a point -> None for a fixed point, or a Translation, Oscillation or Rotation that leads it.
+        guides: (number of a point, surface without edges): the point starts and stays on the surface.
         cavities: (surface without edges, carrier, point): the surface moves with the point `carrier`, its origin, and
-            holds `point` on its admissible side.
+            keeps `point` on its admissible side.
         faces: (F, 3) triangles of contact points, for pictures.
 
     Raises:
@@ -114,7 +114,7 @@ class Body:
     cavities: tuple[tuple[Surface, int, int], ...]
     faces: Pairs
 
-    def __init__(  # noqa: PLR0913  # a body is described by what it has; most have few of these
+    def __init__(  # noqa: PLR0913  # most bodies have few of these properties
         self,
         points: ArrayLike,
         mass: ArrayLike | None = None,
@@ -153,7 +153,7 @@ class Body:
         tied.require_independent(self.points, self.links, self.anchors, self.guides)
 
     def __len__(self) -> int:
-        """Number of base points P."""
+        """The number of base points P."""
         return len(self.points)
 
     def __repr__(self) -> str:
@@ -161,22 +161,22 @@ class Body:
         return f"Body({', '.join([f'{len(self)} points', *(f'{n} {name}' for name, n in parts.items() if n)])})"
 
     def strained(self) -> Pairs:
-        """(E, 2) the edges of its strain."""
+        """The edges (E, 2) of the strain."""
         return np.zeros((0, 2), np.int64) if self.strain is None else self.strain.edges
 
     def bonds(self) -> Pairs:
-        """(B, 2) all pairs that are tied: links, springs, and edges of the strain."""
+        """All tied pairs of points (B, 2): links, springs, and edges of the strain."""
         springs = np.array([spring[:2] for spring in self.springs], dtype=np.int64).reshape(-1, 2)
         return np.concatenate([self.links, springs, self.strained()])
 
     def center_of(self, position: Floats) -> Floats:
-        """(3, n) the centres of mass of copies (3, P, n), or with velocities those of the centres."""
+        """The centres of mass (3, n) of copies (3, P, n), or their velocities from velocities (3, P, n)."""
         weight = self.mass_matrix.sum(axis=0)
-        # Not by BLAS: its last bit depends on the processor, and on how many copies there are.
+        # BLAS is not used, as its last bit depends on the processor and on the number of copies.
         return np.asarray(sum(part * position[:, point] for point, part in enumerate(weight / weight.sum())))
 
     def inverse_mass(self) -> Floats:
-        """(P, P) the inverse of the masses of the points that can move; 0 at anchored ones."""
+        """The inverse (P, P) of the mass matrix of the points that can move; 0 at anchored points."""
         free = np.setdiff1d(np.arange(len(self)), list(self.anchors))
         inverse = np.zeros((len(self), len(self)))
         inverse[np.ix_(free, free)] = algebra.inverse(self.mass_matrix[np.ix_(free, free)])
@@ -184,7 +184,7 @@ class Body:
 
 
 def _of_body(strain: Strain | None, count: int) -> Strain | None:
-    """`strain` of a body of so many points, checked."""
+    """Return the strain of a body of `count` points, checked."""
     if strain is not None:
         if not isinstance(strain, Strain):
             raise SceneError(f"strain must be a swarm.Strain or None, got {checks.shown(strain)}")

@@ -36,19 +36,19 @@ from .lanes.body_arrays import BodyState, StepRule
 from .lanes.contacts import MOST_CONTACTS
 from .numbers import led_points, most_contacts_of, own_surfaces, ties_of, touching_of, walls_of
 
-# Bytes of the lanes of a thread, which are on its stack, if one lane takes no more, and the most lanes.
+# The most bytes of the lanes of a thread, which are on its stack, unless one lane takes more; the most lanes.
 _STACK, _MOST_LANES = 1 << 20, 32
-# What else a stack holds; and stacks are whole pages.
+# The bytes for everything else on a stack; stacks are whole pages.
 _REST, _PAGE = 8 << 20, 1 << 16
-# Bodies that a thread draws at a time.
+# The bodies that a thread draws at a time.
 _AT_ONCE = 256
-# Suzuki's composition: five steps of second order are one of fourth.
+# Suzuki's composition: five steps of second order make one step of fourth order.
 _OUTER = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
 STAGES = {2: (1.0,), 4: (_OUTER, _OUTER, 1.0 - 4.0 * _OUTER, _OUTER, _OUTER)}
 
 
 class BodyRun(BaseRun):
-    """The run of copies of a body; with them come all their points: the arrays of these are a part of its state."""
+    """The run of copies of a body; the arrays of their points are a part of its state."""
 
     def __init__(
         self, compiled: CompiledScene, copies: tuple[Bodies, Particles], method: Method, threads: int,
@@ -75,7 +75,7 @@ class BodyRun(BaseRun):
         crossed = None if counters is None else crossed_of(counters, self._counted_by, scene, bodies.centers())
         self._bodies = _state_of(bodies, particles, (rows, walls), opens, scene.moves(), laws, crossed)
         none = np.zeros(0)
-        # What files take of a run.
+        # The part of the state that files take.
         self.state = State(
             particles.position, particles.velocity, particles.mass, none, none, np.zeros(points * n, np.int64),
             np.zeros((walls, 0)), none, None,
@@ -86,10 +86,10 @@ class BodyRun(BaseRun):
         lanes = max(1, min(_MOST_LANES, _STACK // per_lane, n))
         drawn = max(1, block_size or _AT_ONCE)
         threads = min(threads, math.ceil(n / drawn))
-        # Matrices of ties, and of contacts, of one body.
+        # The bytes of the matrices of ties and of contacts of one body.
         pressed = max(contacts, 3 * MOST_CONTACTS)
         at_once = 8 * (rows * rows + pressed * (pressed + 3 * rows))
-        # In plain Python a step takes some milliseconds: it never pays.
+        # In plain Python a step takes some milliseconds, so that compilation always pays.
         tier = Tier("always" if compile == "auto" else compile, self._walls, n * points)
         pool = threads_with(threads, lanes * per_lane + at_once)
         super().__init__(compiled, method, n, threads, tier, seeding, watched, pool)
@@ -100,13 +100,13 @@ class BodyRun(BaseRun):
         self._least, self._room = math.sqrt(min([*(self._link_lengths() ** 2), size * size])), room
         noise = room / self._least
         dt, stages = method.dt, np.array(STAGES[getattr(method, "order", 2)])  # type: ignore[attr-defined]
-        # More gain in a compiled kernel alone.
+        # More lanes gain only in a compiled kernel.
         lanes = 1 if tier.is_plain else lanes
         self._rule = StepRule(
             dt, stages, gravity, 0.0, room, noise, lanes, soft, contacts, looped,
             getattr(method, "on_unconverged", "") == "raise", compiled.cell(),
         )  # fmt: skip
-        # Frames of fixed steps are counted in steps.
+        # The frames of fixed steps are counted in steps.
         self._unit = 1.0 if soft is None or soft.is_cut else dt
         self._mass = float(self._ties.mass.sum())
         self._falls = -gravity * [length or 0.0 for length in scene.period or (None,) * 3]
@@ -126,7 +126,7 @@ class BodyRun(BaseRun):
         return [(advance_bodies, self._arguments(0, np.zeros(1, np.int64)))]
 
     def _arguments(self, thread: int, ticket: Any, page: ThreadLog | None = None) -> tuple[Any, ...]:
-        """Arguments of `advance_bodies`, with the counts of a thread, and its page of the log."""
+        """Return the arguments of `advance_bodies`, with the counts of a thread, and its page of the log."""
         counts = None if self._tally is None else self._tally.of_thread(thread)
         watchers = self._watchers(self._counters)._replace(counts=counts)
         watchers = watchers if page is None else page.watched_by(watchers)
@@ -137,7 +137,7 @@ class BodyRun(BaseRun):
         if self._changes:
             self._reach(moment)
         if self._scene.moves():
-            # Places at a wall have the round-off of how far it has come.
+            # Places at a wall have the round-off of its displacement.
             far = max(math.hypot(*pose(surface.motion, moment).shift) for surface in self._scene.surfaces)
             room = max(self._room, SOLVED_PLACE * far)
             self._rule = self._rule._replace(room=room, noise=room / self._least)
@@ -150,16 +150,16 @@ class BodyRun(BaseRun):
         self._rule = self._rule._replace(end=moment)
 
     def _energy_of(self, r: Floats, v: Floats) -> Floats:
-        """The energy of copies."""
+        """The energy of copies (n,) [J]."""
         return self._energies.kinetic(v) + self._energies.fall(r) + self._energies.stored(r)
 
     def _begin_books(self, some: Any, r: Floats, v: Floats) -> None:
-        """Begin the books of the energy of copies that are there now."""
+        """Begin the books of the energy of copies that are now in the scene."""
         self._energy_start[some] = start = self._energy_of(r, v)
         self._scale[some] = np.maximum(np.abs(start), self._energies.kinetic(v)) + self._pull
 
     def _feed_in(self, moment: float) -> None:
-        """Let those come that are due up to a moment [s]; what is left of the frame is theirs."""
+        """Add the bodies that are due up to a moment [s]; they move for the rest of the frame."""
         feed, bodies = self._feed, self._bodies
         if not isinstance(feed, BodyFeed):
             return
@@ -174,7 +174,7 @@ class BodyRun(BaseRun):
                 bodies.crossed.side[:, some] = sides
 
     def _reach(self, moment: float) -> None:
-        """The walls of the frame, or its piece, that ends at a moment [s]: alone, with those of the body, and open."""
+        """Set the walls, those with the body's own, and the openings of the frame, or its piece, up to a moment [s]."""
         made = self._compiled.walls_of_bodies
         self._walls = made((), moment), made(self._own, moment), self._compiled.openings(moment)
 
@@ -191,7 +191,7 @@ class BodyRun(BaseRun):
                 )
 
     def _depths(self, some: slice, r: Floats, moment: float) -> Floats:
-        """How far contact points are outside of each surface (surfaces, K n) [m]; those through an opening are not."""
+        """The distances of contact points outside of each surface (surfaces, K n) [m]; -inf beyond an opening."""
         points = self._energies.contact_points(r).reshape(3, -1)
         depths = self._scene.distances_outside(points, moment)
         if self._bodies.free is not None:
@@ -234,13 +234,13 @@ class BodyRun(BaseRun):
     def _share_done(self, span: float) -> float:
         return float((1.0 - self._bodies.remaining / (span * self._unit)).mean())
 
-    # --- What is observed --------------------------------------------------------------------------------
+    # --- Observation -------------------------------------------------------------------------------------
 
     def _blocks(self) -> Iterator[tuple[Any, Floats, Floats]]:
-        """The bodies by chunks: which they are, their positions and velocities.
+        """Yield the bodies by chunks: their numbers, positions and velocities.
 
-        BLAS rounds a column by how many there are, and NumPy a sum by where its numbers lie: with arrays of its own a
-        chunk has the same bits in every run that it is a part of.
+        The round-off of BLAS depends on the number of columns, and that of a sum of NumPy on the layout in memory. With
+        contiguous arrays a chunk has the same bits in every run that contains it.
         """
         for begin in range(0, len(self._bodies.remaining), CHUNK):
             some: Any = slice(begin, begin + CHUNK)
@@ -260,7 +260,7 @@ class BodyRun(BaseRun):
         return np.asarray(np.sqrt(((tied[:, 0] - tied[:, 1]) ** 2).sum(axis=1)))
 
     def _out_of_own(self) -> Iterator[Floats]:
-        """The distance of points outside of the cavities that others carry."""
+        """Yield the distances of points outside of the cavities that other points carry."""
         r = self._bodies.position
         for cavity, (_surface, carrier, point) in zip(self._carried, self._body.cavities, strict=True):
             yield cavity.scene.distances_outside(r[:, point] - r[:, carrier])
@@ -276,7 +276,7 @@ class BodyRun(BaseRun):
             self.state.escape_time[:] = np.tile(bodies.escape_time, len(self._body))
         if self.state.absorbed_time is not None:
             self.state.absorbed_time[:] = np.tile(bodies.absorbed_time, len(self._body))
-            # A body counts once.
+            # A body counts as one, not as its points.
             self.state.absorbed_wall[: len(bodies.absorbed_wall)] = bodies.absorbed_wall  # type: ignore[index]
         if self.state.image is not None:
             self.state.image[:] = np.tile(bodies.image, len(self._body))
@@ -302,14 +302,14 @@ class BodyRun(BaseRun):
             self._seen["sweeps"] = int(bodies.sweeps.sum())
 
     def _sums_of(self, some: Any, r: Floats, v: Floats, moment: float) -> tuple[list[float], float, float]:
-        """Of one chunk: what is summed, as `summed` takes it, the largest error of the energy, how far it is out."""
+        """Return the sums of a chunk, as `summed` takes them, its largest error of the energy, and largest depth."""
         energies, bodies = self._energies, self._bodies
         kinetic, fall, elastic = energies.kinetic(v), energies.fall(r), energies.stored(r)
         total, lost = kinetic + fall + elastic, bodies.dissipated[some]
         work = bodies.work[some] + energies.led(r, v) - self._led_start[some]
         error, scale = np.abs(total + lost - work - self._energy_start[some]), self._scale[some]
         if self._scene.moves() or bodies.heat is not None:
-            # What walls have given is a scale too: a body may start at rest.
+            # The energy that walls have given is a scale too, as a body may start at rest.
             scale = np.maximum(scale, kinetic)
         scaled = np.divide(error, scale, out=np.zeros_like(error), where=scale > 0.0)
         pushed = np.ascontiguousarray(bodies.impulse[:, some]).sum(axis=1)
@@ -317,14 +317,14 @@ class BodyRun(BaseRun):
             if books is not None:
                 given = np.ascontiguousarray(books[: len(self._owners), some])
                 pushed = np.concatenate([pushed, given.sum(axis=1)])
-                # The rest is that of anchors.
+                # The rest is the work of anchors.
                 work = work - given.sum(axis=0) if len(bodies.path) else np.zeros_like(work)
         if bodies.crossed is not None:
             parts = (bodies.crossed.number, bodies.crossed.sums)
             passed = [np.ascontiguousarray(part[:, some]).sum(axis=1) for part in parts]
             pushed = np.concatenate([pushed, *passed])
         if bodies.image is not None:
-            # The books are of places in the cell.
+            # The books have the energy of places in the cell.
             whole = np.einsum("x,xn->n", self._mass * self._falls, bodies.image[:, some])
             fall, total = fall + whole, total + whole
         numbers = (kinetic, fall, elastic, total, lost, bodies.sliding[some], work)
@@ -359,14 +359,14 @@ class BodyRun(BaseRun):
 
 
 def threads_with(count: int, scratch: int) -> ThreadPoolExecutor:
-    """A pool of `count` threads, all of them begun, each with room for so many bytes of scratch arrays.
+    """Return a pool of `count` started threads, each with room for `scratch` bytes of scratch arrays.
 
-    Scratch memory that is not used costs nothing: the system maps a stack page by page.
+    Unused scratch memory costs nothing, as the system maps a stack page by page.
     """
     before = threading.stack_size(-(-(scratch + _REST) // _PAGE) * _PAGE)
     try:
         pool = ThreadPoolExecutor(count, thread_name_prefix="swarm")
-        # Each waits for all the others, so none takes the turn of two.
+        # Each task waits for all others, so that no thread runs two of them.
         together = threading.Barrier(count)
         for begun in [pool.submit(together.wait) for _ in range(count)]:
             begun.result()
@@ -379,11 +379,11 @@ def _state_of(
     bodies: Bodies, particles: Particles, size: tuple[int, int], opens: bool, moves: bool, laws: Laws,
     crossed: Crossed | None,
 ) -> BodyState:  # fmt: skip
-    """All copies at the start, with so many rows of multipliers and of walls, of which some may open or move."""
+    """Return the state of all copies at the start; `size` has the rows of multipliers and of walls."""
     (rows, walls), n, body = size, len(bodies), bodies.body
     anchors = [(q, body.anchors[q]) for q in led_points(body)]
     paths = [[motion.harmonic(start) for start in bodies.position[:, q].T] for q, motion in anchors]  # type: ignore[union-attr]
-    # (A, 13, n) start, velocity, cosine, sine and rate of each led point of each copy.
+    # (A, 13, n): the start, velocity, cosine, sine and rate of each led point of each copy.
     path = np.array([[np.hstack(one) for one in copies] for copies in paths]).reshape(-1, n, 13).transpose(0, 2, 1)
     guess = np.full((3, rows, n), math.nan)
     guess[0] = 0.0

@@ -15,16 +15,16 @@ from . import room
 Pairs = NDArray[np.int64]
 Spring = tuple[int, int, float, float]
 
-# Two points nearer than this, relative to their coordinates, have no direction to each other.
+# Two points nearer than this, relative to their coordinates, define no direction.
 _SAME_PLACE = 1e-12
-# The round-off of a matrix that was assembled, and of rows of coefficients, relative to their largest entry.
+# The round-off of an assembled matrix, and of rows of coefficients, relative to their largest entry.
 _ROUND_OFF = 1e-12
-# Points of a body that is not known yet.
+# A bound of the numbers of points of a body that is not known yet.
 _ANY_POINT = 1 << 31
 
 
 def places(name: str, value: ArrayLike) -> Floats:
-    """`value` as (P, 3) places."""
+    """Return `value` as places (P, 3)."""
     rows = checks.array(name, value)
     if rows.ndim != 2 or rows.shape[1] != 3 or not len(rows):
         hint = "; transpose it" if rows.ndim == 2 and rows.shape[0] == 3 else ""
@@ -34,7 +34,7 @@ def places(name: str, value: ArrayLike) -> Floats:
 
 
 def finite(name: str, values: Floats) -> Floats:
-    """`values` if all are finite and at most 1e100."""
+    """Return `values` if all are finite and at most 1e100."""
     # NaN compares as false.
     bad = np.argwhere(~(np.abs(values) <= checks.LARGEST))
     if len(bad):
@@ -46,7 +46,7 @@ def finite(name: str, values: Floats) -> Floats:
 
 
 def mass_matrix(mass: ArrayLike | None, matrix: ArrayLike | None, count: int) -> Floats:
-    """The (P, P) mass matrix from the masses or from itself."""
+    """Return the mass matrix (P, P), from masses or as given."""
     if (mass is None) == (matrix is None):
         came = "neither" if mass is None else "both"
         raise SceneError(f"a body needs one of mass and mass_matrix, got {came}")
@@ -75,7 +75,7 @@ def _masses(name: str, masses: Floats) -> Floats:
 
 
 def symmetric(name: str, matrix: Floats) -> Floats:
-    """`matrix` if it is symmetric; made so to the last bit."""
+    """Return `matrix` if it is symmetric, made symmetric to the last bit."""
     off = np.abs(matrix - matrix.T)
     if off.max() > _ROUND_OFF * np.abs(matrix).max():
         i, j = (int(k) for k in np.unravel_index(off.argmax(), off.shape))
@@ -86,9 +86,9 @@ def symmetric(name: str, matrix: Floats) -> Floats:
 
 
 def modes_unless_above(bound: float, matrix: Floats) -> tuple[Floats, Floats] | None:
-    """Eigenvalues and eigenvectors of a symmetric matrix; None where all eigenvalues are above a bound."""
+    """Return eigenvalues and eigenvectors of a symmetric matrix; None if all eigenvalues are above a bound."""
     try:
-        # Far faster than eigenvalues, which say where it is wrong.
+        # A factorization is far faster than eigenvalues, which are needed only to show what is wrong.
         np.linalg.cholesky(matrix - bound * np.eye(len(matrix)))
     except np.linalg.LinAlgError:
         values, vectors = np.linalg.eigh(matrix)
@@ -97,7 +97,7 @@ def modes_unless_above(bound: float, matrix: Floats) -> tuple[Floats, Floats] | 
 
 
 def _positive_definite(name: str, matrix: Floats) -> Floats:
-    # Scaled to a diagonal of ones, so that a light point beside a heavy one is no singularity.
+    # The matrix is scaled to a diagonal of ones, so that a light point beside a heavy one is no singularity.
     scale = np.sqrt(np.diagonal(matrix))
     least = _ROUND_OFF + 8.0 * len(matrix) * EPSILON
     modes = modes_unless_above(least, matrix / scale / scale[:, None])
@@ -113,7 +113,7 @@ def _positive_definite(name: str, matrix: Floats) -> Floats:
 
 
 def not_negative(name: str, matrix: Floats) -> None:
-    """Raise if a symmetric matrix has a negative eigenvalue beyond round-off."""
+    """Raise a `SceneError` if a symmetric matrix has a negative eigenvalue beyond round-off."""
     modes = modes_unless_above(-_ROUND_OFF * np.abs(matrix).max(), matrix)
     if modes is not None:
         raise SceneError(
@@ -123,7 +123,7 @@ def not_negative(name: str, matrix: Floats) -> None:
 
 
 def point(name: str, value: Any, count: int | None) -> int:
-    """`value` as the number of one of `count` points."""
+    """Return `value` as the number of one of `count` points."""
     number, below = checks.count(name, value, least=0), _ANY_POINT if count is None else count
     if number >= below:
         came = f"{number}" if number < _ANY_POINT else f"{min(number, 10**300):.6g}"
@@ -132,7 +132,7 @@ def point(name: str, value: Any, count: int | None) -> int:
 
 
 def numbers(name: str, rows: Iterable[Any], width: int, count: int | None) -> Pairs:
-    """`rows` as (N, width) numbers of points, no point twice in a row and no row twice; count None: of any body."""
+    """Return `rows` as numbers of points (N, width), distinct in and between rows; count None: of any body."""
     result = []
     for row, parts in each(name, rows, width, "numbers of points"):
         given = tuple(point(f"{row}[{i}]", part, count) for i, part in enumerate(parts))
@@ -147,13 +147,13 @@ def _require_once(name: str, keys: Iterable[Hashable], names: Sequence[str]) -> 
     found: dict[Hashable, int] = {}
     for k, key in enumerate(keys):
         if found.setdefault(key, k) < k:
-            raise SceneError(f"{name}[{k}]{names[k]} is there already as {name}[{found[key]}]; leave one of them out")
+            raise SceneError(f"{name}[{k}]{names[k]} is listed already as {name}[{found[key]}]; leave one of them out")
 
 
 def each(name: str, rows: Iterable[Any], width: int, parts: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    """The name, as links[3], and the parts of each row of an argument.
+    """Yield the name, such as links[3], and the parts of each row of an argument.
 
-    The parts are of one kind, as "numbers of points", or each has a name, as "(i, j, stiffness, rest length)".
+    The parts are of one kind, such as "numbers of points", or have names, such as "(i, j, stiffness, rest length)".
     """
     named = parts.startswith("(")
     try:
@@ -163,13 +163,13 @@ def each(name: str, rows: Iterable[Any], width: int, parts: str) -> Iterator[tup
             yield where, checks.entries(where, given, width, f"{width} {'values ' * named}{parts}")
     except SceneError:
         raise
-    except Exception:  # it has no parts, or is an object of others
+    except Exception:  # the argument has no parts, or is an object of another package
         expected = f"rows {parts}" if named else f"rows of {width} {parts}"
         raise SceneError(f"{name} must be {expected}, got {checks.shown(rows)}") from None
 
 
 def links(rows: Iterable[Any], places: Floats) -> Pairs:
-    """`rows` as (L, 2) pairs of points at different places."""
+    """Return `rows` as pairs (L, 2) of points at different places."""
     pairs = numbers("links", rows, 2, len(places))
     for k, (i, j) in enumerate(pairs.tolist()):
         if _at_one_place(places[i], places[j]):
@@ -185,7 +185,7 @@ def _at_one_place(first: Floats, second: Floats) -> bool:
 
 
 def springs(rows: Iterable[Any], places: Floats) -> tuple[Spring, ...]:
-    """`rows` as springs (i, j, stiffness, rest length)."""
+    """Return `rows` as springs (i, j, stiffness, rest length)."""
     result = []
     for row, given in each("springs", rows, 4, "(i, j, stiffness, rest length)"):
         i, j = (point(f"{row}[{n}]", given[n], len(places)) for n in range(2))
@@ -204,7 +204,7 @@ def springs(rows: Iterable[Any], places: Floats) -> tuple[Spring, ...]:
 
 
 def contacts(value: ArrayLike | None, count: int, anchored: Iterable[int]) -> Floats:
-    """`value`, numbers of points or rows of coefficients, as (K, P) coefficients; no contact twice."""
+    """Return `value`, numbers of points or rows of coefficients, as coefficients (K, P) of distinct contacts."""
     held = set(anchored)
     if value is None:
         free = [p for p in range(count) if p not in held]
@@ -214,7 +214,7 @@ def contacts(value: ArrayLike | None, count: int, anchored: Iterable[int]) -> Fl
     room.require(count, contacts=len(rows) if rows.ndim else 0)
     if rows.ndim == 1:
         chosen = [point(f"contacts[{k}]", number, count) for k, number in enumerate(np.asarray(value).tolist())]
-        # Faster than rows that are compared.
+        # Comparing numbers is faster than comparing rows.
         _require_once("contacts", chosen, [""] * len(chosen))
         rows = np.eye(count)[chosen]
     if rows.ndim != 2 or rows.shape[1] != count:

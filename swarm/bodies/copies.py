@@ -16,16 +16,16 @@ from .body import Body
 from .checked import Pairs
 from .tied import Tie, ties
 
-# How exactly a link must have its length at the start, relative.
+# The largest relative error of the length of a link at the start.
 _LINK = 1e-9
 
-# A stage keeps lengths by lambda, so velocities along a link that contradict it turn at each step and never vanish.
-# How exactly velocities must agree with ties, relative to the fastest point of the copy: as exactly as lengths do, by
-# which the directions of ties are known. What turns at each step is then 1e-18 of the kinetic energy.
+# The largest velocity that contradicts a tie, relative to the fastest point of the copy. A stage conserves lengths, so
+# that such a velocity is reversed at each step and never vanishes. The limit is that of lengths, which determine the
+# directions of ties. The part that is reversed at each step is then 1e-18 of the kinetic energy.
 _AGREED = 1e-9
-# Of a projection: corrections, each of which takes all but the round-off of the equations from what is left.
+# The corrections of a projection; each one removes the error but for round-off of the equations.
 _CORRECTIONS = 3
-# The most numbers of systems of ties solved at once.
+# The most numbers in the systems of ties that are solved together.
 _BATCH = 1 << 20
 
 
@@ -33,18 +33,18 @@ class Bodies(TiedParticles):
     """n copies of a body.
 
     Args:
-        body: the template. An anchored point of a copy is fixed, or led from, where that copy has it.
-        position: (3, P, n) or, of one copy, (3, P) [m], rows x, y, z of every point; the links have their lengths.
-        velocity: the same shape [m/s]: along a link its points have the same, across a guide a point has none, and that
-            of an anchored point is of its path at the start, or 0, which stands for it.
-        project: whether the nearest velocities that agree with links, guides and paths are taken, nearest in the metric
-            of the kinetic energy; False: velocities that do not agree are an error.
+        body: the template. An anchored point of a copy is fixed at its place in the copy, or led from there.
+        position: (3, P, n), or (3, P) for one copy [m], rows x, y, z of every point; links have their lengths.
+        velocity: in the shape of `position` [m/s]. The points of a link have the same velocity along it; a guided point
+            has none across its guide; an anchored point has that of its path at the start, or 0, which stands for it.
+        project: whether to take the nearest velocities that agree with links, guides and paths, in the metric of the
+            kinetic energy; False: velocities that do not agree are an error.
 
-    The arrays are copied, in C order. Those of a result or a trajectory agree as far as the steps of the run let them.
+    The arrays are copied, in C order. The velocities of a result or a trajectory agree to the order of the steps.
 
     Raises:
-        SceneError: wrong shapes, no copy, a value that is not finite or beyond 1e100, a link that is not as long as the
-            template's, a guided point that is not on its surface, velocities that contradict a link, a guide or a path.
+        SceneError: wrong shapes, no copy, a value that is not finite or beyond 1e100, a link with a wrong length, a
+            guided point that is not on its surface, velocities that contradict a link, a guide or a path.
 
     >>> import swarm
     >>> rod = swarm.dumbbell(length=2.0, mass=1.0)
@@ -59,11 +59,11 @@ class Bodies(TiedParticles):
     body: Body
     position: Floats
     velocity: Floats
-    # Of all copies, in a run with sources.
+    # The births of all copies, in a run with sources.
     births: Births | None = None
-    # (3, n) how many cells away each is, in a run of a scene that repeats.
+    # (3, n) the cell of each copy, in a run of a periodic scene.
     image: NDArray[np.int64] | None = None
-    # Whether a run left them: its steps keep lengths, and velocities along ties but to the order of the step.
+    # Whether the copies are the result of a run: velocities then agree with ties only to the order of the step.
     _is_of_run = False
 
     def __init__(self, body: Body, position: ArrayLike, velocity: ArrayLike, *, project: bool = False) -> None:
@@ -87,7 +87,7 @@ class Bodies(TiedParticles):
             holding.on_surface(f"guides[{k}]: point {point}", surface, self.position[:, point])
 
     def copy(self) -> "Bodies":
-        """The same bodies as a start, checked again, with arrays of their own."""
+        """Return the same bodies as a start, checked again, in copied arrays."""
         if not self._is_of_run:
             return Bodies(self.body, self.position, self.velocity)
         made = Bodies.of_run(self.body, self.position, self.velocity)
@@ -98,15 +98,15 @@ class Bodies(TiedParticles):
         return f"Bodies({len(self)} of {len(self.body)} points)"
 
     def contact_points(self) -> Floats:
-        """(3, K, n) the points that can touch walls."""
+        """The points (3, K, n) that can touch walls."""
         return np.asarray(np.einsum("kp,xpn->xkn", self.body.contacts, self.position))
 
     def centers(self) -> Floats:
-        """(3, n) the centres of mass."""
+        """The centres of mass (3, n)."""
         return self.body.center_of(self.position)
 
     def in_cell(self, scene: Scene) -> "Bodies":
-        """The same bodies with their centres of mass in the cell, where a scene repeats."""
+        """Return the same bodies, in a periodic scene with their centres of mass in the cell."""
         if scene.period is None:
             return self
         center = self.centers()
@@ -116,32 +116,32 @@ class Bodies(TiedParticles):
         return made
 
     def bonds(self) -> Pairs:
-        """(B n, 2) the pairs of points that are tied, of all copies, as numbers of `particles`."""
+        """The tied pairs of points (B n, 2) of all copies, as numbers of `particles`."""
         n = len(self)
         return np.asarray((self.body.bonds()[:, None] * n + np.arange(n)[:, None]).reshape(-1, 2))
 
     def moved(self, particles: Particles) -> "Bodies":
-        """These bodies where their points, as `particles` gives them, are now."""
+        """Return these bodies at the present places of their points, which are `particles`."""
         shape = self.position.shape
         return Bodies.unchecked(self.body, particles.position.reshape(shape), particles.velocity.reshape(shape))
 
     @staticmethod
     def unchecked(body: Body, position: Floats, velocity: Floats) -> "Bodies":
-        """Bodies of a run: a tolerance of Uzawa's loop is the run's, and more than what a start may be off by."""
+        """Return the bodies of a run without checks: Uzawa's loop may leave larger errors than a start may have."""
         made = object.__new__(Bodies)
         made.body, made.position, made.velocity, made._is_of_run = body, position, velocity, True
         return made
 
     @staticmethod
     def of_run(body: Body, position: ArrayLike, velocity: ArrayLike) -> "Bodies":
-        """Bodies that a run left, checked as those of a start but for their velocities."""
+        """Return the bodies of a run, checked as a start but for their velocities."""
         made = object.__new__(Bodies)
         made._take(body, position, velocity)
         made._is_of_run = True
         return made
 
     def particles(self) -> Particles:
-        """All points as particles: point p of copy i is number p n + i.
+        """Return all points as particles: point p of copy i has the number p n + i.
 
         Their masses are the diagonal of the mass matrix, scaled to the mass of the body: always above 0.
         """
@@ -170,7 +170,7 @@ def _rows(name: str, value: ArrayLike, count: int) -> Floats:
 
 
 def _require_lengths(body: Body, position: Floats) -> None:
-    """Raise unless every link of every copy is as long as the template's."""
+    """Raise a `SceneError` unless every link of every copy is as long as in the template."""
     for k, (i, j) in enumerate(body.links.tolist()):
         wanted = np.sqrt(((body.points[i] - body.points[j]) ** 2).sum())
         lengths = np.sqrt(((position[:, i] - position[:, j]) ** 2).sum(axis=0))
@@ -183,10 +183,10 @@ def _require_lengths(body: Body, position: Floats) -> None:
 
 
 def led_along(body: Body, position: Floats, velocity: Floats) -> Floats:
-    """`velocity` (3, P, n) with that of its path at every anchored point, where it may be left at 0.
+    """Return `velocity` (3, P, n) with the velocity of its path at every anchored point, where it may be 0.
 
     Raises:
-        SceneError: it is another.
+        SceneError: an anchored point has another velocity.
     """
     made = velocity.copy()
     for point, motion in body.anchors.items():
@@ -210,7 +210,7 @@ def led_along(body: Body, position: Floats, velocity: Floats) -> Floats:
 
 
 def require_agreed(body: Body, position: Floats, velocity: Floats, projected: bool) -> None:
-    """Raise a `SceneError` where a point has a velocity that its link or guide does not let it have."""
+    """Raise a `SceneError` where a velocity contradicts a link or a guide."""
     fastest = _fastest(velocity)
     for tie in ties(body.links, body.guides, position):
         speeds = np.abs(_speed(tie, velocity))
@@ -234,9 +234,9 @@ def require_agreed(body: Body, position: Floats, velocity: Floats, projected: bo
 
 
 def projected(body: Body, position: Floats, velocity: Floats) -> Floats:
-    """The velocities nearest to `velocity` (3, P, n), in the metric of the kinetic energy, that agree with ties.
+    """Return the velocities that agree with ties, nearest to `velocity` (3, P, n) in the metric of the kinetic energy.
 
-    v - W J^T (J W J^T)^-1 J v, of the inverse W of the masses of points that can move, and the ties' J v = 0.
+    These are v - W J^T (J W J^T)^-1 J v, with the inverse W of the masses of points that can move, and J v = 0 of ties.
     """
     made, inverse, tied = velocity.copy(), body.inverse_mass(), len(body.links) + len(body.guides)
     many = max(1, _BATCH // max(1, tied) ** 2)
@@ -246,7 +246,7 @@ def projected(body: Body, position: Floats, velocity: Floats) -> Floats:
         normal = np.array([tie.normal for tie in held])
         pushed = np.array([sum(sign * inverse[point] for point, sign in tie.ends()) for tie in held])
         coupling = np.array([sum(sign * pushed[:, point] for point, sign in tie.ends()) for tie in held])
-        # In units of each tie's own, so that a light point beside a heavy one is no singularity.
+        # Each tie is scaled by its own coupling, so that a light point beside a heavy one is no singularity.
         unit = 1.0 / np.sqrt(np.maximum(np.diagonal(coupling), TINY))
         coupling *= unit[:, None] * unit
         system = coupling[:, :, None] * sum(normal[:, None, axis] * normal[:, axis] for axis in range(3))
@@ -259,10 +259,10 @@ def projected(body: Body, position: Floats, velocity: Floats) -> Floats:
 
 
 def _speed(tie: Tie, velocity: Floats) -> Floats:
-    """(n,) along the normal of a tie [m/s], of velocities (3, P, n): what must be 0."""
+    """The velocity along a tie (n,) [m/s], which must be 0, from velocities (3, P, n)."""
     return np.asarray((tie.normal * sum(sign * velocity[:, point] for point, sign in tie.ends())).sum(axis=0))
 
 
 def _fastest(velocity: Floats) -> Floats:
-    """(n,) the speed of the fastest point of each copy."""
+    """The speed of the fastest point of each copy (n,)."""
     return np.asarray(np.sqrt((velocity**2).sum(axis=0).max(axis=0)))

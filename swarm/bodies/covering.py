@@ -1,6 +1,6 @@
-"""Contact points on the edges and faces of a body, and how far its surface is from them.
+"""Contact points on the edges and faces of a body, and the distance of its surface from them.
 
-Only contact points touch walls. A solid that is smaller than the gaps between them passes into the body.
+Only contact points touch walls. A solid smaller than the gaps between contact points passes into the body.
 """
 
 import functools
@@ -13,20 +13,21 @@ from . import algebra, room
 from .body import Body
 from .checked import Pairs
 
-# Parts into which the sides of a triangle are cut at first, and at last, where its distance to contact points is looked
-# at. A point between is farther from them by a part of 1/sqrt(3) at most, and by this share of what is found.
+# The parts into which the sides of a triangle are cut at first, and at most, to find its distance from contact points.
+# A point between lattice points is farther by at most 1/sqrt(3) of a part. The lattice is fine enough where this is
+# `_SHARE` of the distance found.
 _FIRST, _LAST, _SHARE = 24, 48, 0.25
-# Contact points that are looked at together.
+# The contact points in one array of distances.
 _TOGETHER = 1000
 # A point of a triangle is at most this times its longest side from the nearest corner.
 _LARGEST = 1.0 / math.sqrt(3.0)
 
 
 def points(corners: Floats, triangles: Pairs, spacing: float) -> Floats:
-    """(Q, 3) points on the edges and in the faces, so that neighbours are at most `spacing` apart; without corners.
+    """Return points (Q, 3) on the edges and in the faces, without corners; neighbours are at most `spacing` [m] apart.
 
     Raises:
-        SceneError: they are too many for a body.
+        SceneError: the points are too many for a body.
     """
     edges = np.unique(np.sort(triangles[:, ((0, 1), (1, 2), (2, 0))].reshape(-1, 2), axis=1), axis=0)
     lengths = np.sqrt(((corners[edges[:, 0]] - corners[edges[:, 1]]) ** 2).sum(axis=1))
@@ -45,16 +46,16 @@ def points(corners: Floats, triangles: Pairs, spacing: float) -> Floats:
 
 
 def distance(body: Body) -> float:
-    """The largest distance of a point of the faces to the nearest contact point [m], from above; 0 without faces."""
+    """An upper bound of the distance of a point of the faces to the nearest contact point [m]; 0 without faces."""
     touching = body.contacts @ body.points
     corners = touching[body.faces]
     longest, bounds = _sides(corners).max(axis=1, initial=0.0), _from_corners(corners)
     farthest = 0.0
-    # From the largest on, as far as needed.
+    # The order is that of falling bounds, until a bound is below the distance found.
     for k in np.argsort(-bounds):
         if bounds[k] <= farthest:
             break
-        # From its middle, where squares that are subtracted leave enough digits.
+        # Places are relative to the middle of the triangle, so that differences of squares keep enough digits.
         arms, sides = touching - corners[k].mean(axis=0), corners[k] - corners[k].mean(axis=0)
         near = arms[(arms**2).sum(axis=1) <= (longest[k] + bounds[k]) ** 2]
         parts, nearest, between = _FIRST // 2, 0.0, math.inf
@@ -70,30 +71,30 @@ def distance(body: Body) -> float:
 
 
 def _from_corners(corners: Floats) -> Floats:
-    """(F,) the largest distance of a point of each triangle (F, 3, 3) to the nearest of its corners.
+    """The largest distance (F,) of a point of each triangle (F, 3, 3) to the nearest of its corners.
 
-    Where no angle is obtuse it is the radius of the circle through them, else of a point on the side across from that
-    angle: where the perpendicular bisector of another side, of length b, meets it at an angle A, b/(2 cos A).
+    Without an obtuse angle it is the radius of the circumscribed circle. Else the farthest point is on the longest
+    side, on the perpendicular bisector of another side, of length b, at an angle A: its distance is b/(2 cos A).
     """
     c, b, a = np.sort(_sides(corners), axis=1)[:, ::-1].T
-    # Flat ones too: 0/0 is of a triangle without an area.
+    # A triangle without an area gives 0/0.
     with np.errstate(divide="ignore", invalid="ignore"):
         cos_a, cos_b = (b * b + c * c - a * a) / (2.0 * b * c), (a * a + c * c - b * b) / (2.0 * a * c)
         obtuse = np.maximum(b / (2.0 * cos_a), a / (2.0 * cos_b))
         area4 = np.sqrt(np.maximum((a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c)), 0.0))
         found = np.where(c * c >= a * a + b * b, obtuse, a * b * c / area4)
-    # Never more than of the equilateral triangle of its longest side, whatever round-off says.
+    # The equilateral triangle with the longest side is the bound, whatever round-off gives.
     return np.asarray(np.fmin(found, c * _LARGEST))
 
 
 @functools.cache
 def _lattice(parts: int) -> Floats:
-    """(Q, 3) weights of the corners of a triangle with sides cut into so many parts."""
+    """The weights (Q, 3) of the corners at the lattice points of a triangle with sides cut into `parts` parts."""
     return np.array([(a, b, parts - a - b) for a in range(parts + 1) for b in range(parts + 1 - a)]) / parts
 
 
 def thickness(body: Body) -> float:
-    """Half of its extent along the direction in which its contact points spread least [m]."""
+    """Half of the extent of a body along the direction in which its contact points spread least [m]."""
     touching = body.contacts @ body.points
     arms = touching - touching.mean(axis=0)
     axes = np.linalg.svd(arms, full_matrices=False)[2]
@@ -101,5 +102,5 @@ def thickness(body: Body) -> float:
 
 
 def _sides(corners: Floats) -> Floats:
-    """(F, 3) lengths of the sides of triangles (F, 3, 3)."""
+    """The lengths (F, 3) of the sides of triangles (F, 3, 3)."""
     return np.asarray(np.sqrt(((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=2)))

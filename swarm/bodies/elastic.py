@@ -1,8 +1,8 @@
-"""Elastic bodies: tetrahedra of Saint Venant and Kirchhoff. Their energy is a quadratic form of squared lengths.
+"""Elastic bodies: tetrahedra of Saint Venant and Kirchhoff, with an energy that is quadratic in squared lengths.
 
-Of an element with edges X_a at rest and x_a now, s_a - s_a0 = |x_a|^2 - |X_a|^2 = 2 X_a.E X_a for the strain
-E = (F^T F - 1)/2. Six edges give the six components of E, so its energy V = volume (lambda/2 tr(E)^2 + mu E:E) is
-(s - s0).K (s - s0)/2 exactly.
+An element with edges X_a at rest and x_a now has s_a - s_a0 = |x_a|^2 - |X_a|^2 = 2 X_a.E X_a with the strain
+E = (F^T F - 1)/2. Six edges give the six components of E, so that its energy V = volume (lambda/2 tr(E)^2 + mu E:E) is
+exactly (s - s0).K (s - s0)/2.
 """
 
 import itertools
@@ -22,9 +22,9 @@ from .checked import Pairs
 _EDGES = np.array(list(itertools.combinations(range(4), 2)))
 # The sides of a positively oriented tetrahedron, anticlockwise seen from outside.
 _SIDES = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
-# An element with a volume of less than this times that of a cube of its longest edge has no digits left.
+# The volume below which an element is flat, relative to a cube of its longest edge: no digits are left.
 _FLAT = 1e-9
-# E_xx, E_yy, E_zz, E_yz, E_xz, E_xy: where they are in E, and how often they count in E:E.
+# The components E_xx, E_yy, E_zz, E_yz, E_xz, E_xy: their rows and columns in E, and their multiplicities in E:E.
 _ROWS, _COLUMNS = (0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1)
 _TIMES = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
@@ -32,18 +32,18 @@ _TIMES = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 def elastic(
     mesh: tuple[ArrayLike, ArrayLike], young: float, poisson: float, density: float, mass: str = "lumped"
 ) -> Body:
-    """An elastic solid of Saint Venant and Kirchhoff, made of tetrahedra.
+    """Return an elastic solid of Saint Venant and Kirchhoff, made of tetrahedra.
 
     Args:
-        mesh: (nodes, elements): nodes (P, 3) where they are without stress [m]; elements (T, 4) nodes of each
-            tetrahedron, of which the fourth is seen from outside beyond the first three when these are anticlockwise.
+        mesh: (nodes, elements): the places (P, 3) of the nodes without stress [m], and the nodes (T, 4) of each
+            tetrahedron: seen from the fourth node, the first three are anticlockwise.
         young: Young's modulus, above 0 [Pa].
         poisson: Poisson's ratio, above -1 and below 0.5.
         density: above 0 [kg/m^3].
         mass: "lumped", a quarter of an element at each of its nodes, or "consistent", of linear displacements.
 
     Returns:
-        The body; its contact points are the nodes of its surface, in order, and its faces the triangles of it.
+        The body; its contact points are the nodes of its surface, in order, and its faces the triangles of its surface.
 
     Raises:
         SceneError: an argument is out of its range; an element is flat or inside out; a node is in no element.
@@ -70,11 +70,11 @@ def elastic(
 
 
 def block(lengths: Sequence[float], cells: Sequence[int]) -> tuple[Floats, Pairs]:
-    """Tetrahedra that fill a rectangular block: six in each cell, around the same diagonal, so that they match.
+    """Return tetrahedra that fill a rectangular block: six in each cell, around the same diagonal, so that they match.
 
     Args:
-        lengths: three numbers above 0, the whole block's edges along x, y, z [m].
-        cells: three numbers of cells along them, 1 or more.
+        lengths: three numbers above 0, the edges of the whole block along x, y, z [m].
+        cells: three numbers of cells along x, y, z, 1 or more.
 
     Returns:
         Nodes (P, 3) [m], centred at the origin, and elements (T, 4), as `elastic` takes them.
@@ -103,7 +103,7 @@ def block(lengths: Sequence[float], cells: Sequence[int]) -> tuple[Floats, Pairs
 
 
 def _checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Floats, Pairs, Floats]:
-    """Nodes, elements and the volumes of these."""
+    """Return nodes, elements and the volumes of the elements."""
     if not isinstance(mesh, (tuple, list)) or len(mesh) != 2:
         raise SceneError(f"mesh must be two arrays (nodes, elements), got {type(mesh).__name__}")
     nodes = checked.places("nodes", mesh[0])
@@ -129,7 +129,7 @@ def _checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Floats, Pairs, Floats]:
 
 
 def _edge_vectors(corners: Floats) -> Floats:
-    """(T, 6, 3) of tetrahedra (T, 4, 3)."""
+    """The edge vectors (T, 6, 3) of tetrahedra (T, 4, 3)."""
     return np.asarray(corners[:, _EDGES[:, 1]] - corners[:, _EDGES[:, 0]])
 
 
@@ -142,7 +142,7 @@ def _masses(elements: Pairs, masses: Floats, count: int, consistent: bool) -> Fl
 
 
 def _strain(nodes: Floats, elements: Pairs, volumes: Floats, young: float, poisson: float) -> Strain:
-    # With the gradients b of barycentric coordinates E = -sum over edges (s - s0) (b_i b_j^T + b_j b_i^T)/4, as
+    # The gradients b of barycentric coordinates give E = -sum over edges (s - s0) (b_i b_j^T + b_j b_i^T)/4, as
     # |sum l_i X_i|^2 = -sum over edges l_i l_j s_ij for numbers l that add up to 0.
     corners = nodes[elements]
     sides = corners[:, 1:] - corners[:, :1]
@@ -165,7 +165,7 @@ def _strain(nodes: Floats, elements: Pairs, volumes: Floats, young: float, poiss
 
 
 def _surface(elements: Pairs) -> Pairs:
-    """The triangles that belong to one element alone."""
+    """Return the triangles that belong to one element only."""
     sides = elements[:, _SIDES].reshape(-1, 3)
     unique, index, count = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
     for k in np.flatnonzero(count > 2)[:1]:

@@ -16,13 +16,13 @@ from .numbers import led_points
 
 
 class BodyEnergies:
-    """Energies from positions and velocities of n copies (3, P, n), each (n,) [J].
+    """The energies of n copies, each (n,) [J], from positions and velocities (3, P, n).
 
     Args:
         compiled: the walls.
         carried: a scene for each cavity of the body.
         body, ties: the body.
-        law: what walls that are springs push with; None of rigid ones.
+        law: the law of soft walls; None for rigid walls.
     """
 
     def __init__(
@@ -32,15 +32,15 @@ class BodyEnergies:
         self._gravity = np.array(compiled.scene.gravity or (0.0, 0.0, 0.0))
 
     def kinetic(self, v: Floats) -> Floats:
-        """Of all points."""
+        """The kinetic energy of all points."""
         return np.asarray(0.5 * (np.einsum("pq,xqn->xpn", self._ties.mass, v) * v).sum(axis=(0, 1)))
 
     def fall(self, r: Floats) -> Floats:
-        """In the field of gravity."""
+        """The energy in the field of gravity."""
         return np.asarray(-np.einsum("x,xn->n", self._gravity, np.einsum("p,xpn->xn", self._ties.mass.sum(axis=1), r)))
 
     def stored(self, r: Floats) -> Floats:
-        """Of springs, of the strain, and of walls that are springs."""
+        """The energy stored in springs, in the strain, and in soft walls."""
         return np.asarray(self._elastic(r) + self._in_walls(r))
 
     def _elastic(self, r: Floats) -> Floats:
@@ -66,7 +66,7 @@ class BodyEnergies:
         return total
 
     def led(self, r: Floats, v: Floats) -> Floats:
-        """Kinetic and potential energy of led points themselves."""
+        """The kinetic and potential energy of the led points alone."""
         led = led_points(self._body)
         r, v, mass = r[:, led], v[:, led], self._ties.mass[np.ix_(led, led)]
         moving = np.einsum("pq,xqn->xpn", mass, v)
@@ -74,23 +74,23 @@ class BodyEnergies:
         return np.asarray(0.5 * (moving * v).sum(axis=(0, 1)) - fall)
 
     def momenta(self, r: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """The momentum of all copies together, and their angular momentum."""
+        """Return the momentum, and the angular momentum, of all copies together."""
         momentum = np.einsum("pq,xqn->pxn", self._ties.mass, v).transpose(1, 0, 2)
         return momentum.sum(axis=(1, 2)), np.cross(r, momentum, axis=0).sum(axis=(1, 2))
 
     def contact_points(self, r: Floats) -> Floats:
-        """(3, K, n)."""
+        """The contact points (3, K, n)."""
         return np.asarray(np.einsum("kp,xpn->xkn", self._body.contacts, r))
 
 
 def summed(
     sums: Floats, owners: list[int], surfaces: int, booked: tuple[int, int, bool], counters: int = 0
 ) -> dict[str, Any]:
-    """The observables that are sums over bodies, from those of all chunks (quantities, chunks).
+    """Return the observables that are sums over bodies, from the sums of all chunks (quantities, chunks).
 
-    `owners` says which surface each wall belongs to. Rows of impulse are of these, then of the `own` surfaces of the
-    body, of which the last `cavities` are cavities; behind them the work of the walls, where some move, their heat,
-    where they give any, and what has crossed so many counters; `booked` is (own, cavities, whether they give heat).
+    `owners` has the surface of each wall. Rows of impulse are of the walls, then of the `own` surfaces of the body, the
+    last `cavities` of which are cavities. Then come the work of the walls, if some move, their heat, if they give any,
+    and the crossings of the `counters`. `booked` is (own, cavities, whether walls give heat).
     """
     own, cavities, heats = booked
     kinetic, fall, elastic, total, lost, sliding, work, *vectors = (totals := sums.sum(axis=1))[:13].tolist()

@@ -1,4 +1,4 @@
-"""Checks of what holds points of a body: anchors, guides, and the cavities that others carry."""
+"""Checks of anchors, guides, and the cavities that points of a body carry."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -13,12 +13,12 @@ from ..surfaces.instant import distances, side_of
 from ..surfaces.surface import Surface
 from .checked import each, point
 
-# How far from its surface a guided point may start, relative to the surface's size.
+# The largest distance of a guided point from its surface at the start, relative to the size of the surface.
 _ON_SURFACE = 1e-9
 
 
 def anchors(value: Mapping[int, Any] | None, count: int) -> dict[int, Motion | None]:
-    """`value` as motions of points."""
+    """Return `value` as the motions of points."""
     if value is None:
         return {}
     if not isinstance(value, Mapping):
@@ -36,7 +36,7 @@ def anchors(value: Mapping[int, Any] | None, count: int) -> dict[int, Motion | N
 
 
 def uncoupled(led: Mapping[int, Motion | None], matrix: Floats) -> None:
-    """Raise if a led point has a mass in common with one that can move: its path would push that one."""
+    """Raise a `SceneError` if a led point has a mass coupling with a point that can move, which it would push."""
     for number, motion in led.items():
         coupled = np.flatnonzero(matrix[number])
         if motion is not None and not set(coupled.tolist()) <= set(led):
@@ -48,7 +48,7 @@ def uncoupled(led: Mapping[int, Motion | None], matrix: Floats) -> None:
 
 
 def guides(rows: Iterable[Any], places: Floats, anchored: Iterable[int]) -> tuple[tuple[int, Surface], ...]:
-    """`rows` as (point, surface), each point on its surface."""
+    """Return `rows` as guides (point, surface), each point on its surface."""
     held = set(anchored)
     result = []
     for row, given in each("guides", rows, 2, "(point, surface)"):
@@ -63,7 +63,7 @@ def guides(rows: Iterable[Any], places: Floats, anchored: Iterable[int]) -> tupl
 
 
 def on_surface(name: str, surface: Surface, places: Floats) -> None:
-    """Raise unless places (3, N) are on the surface."""
+    """Raise a `SceneError` unless places (3, N) are on the surface."""
     values, off = surface.phi(places), np.abs(distances(surface, places))
     room = np.minimum(surface.size(), np.maximum(surface.extent(), np.abs(places).max(axis=0)))
     for i in np.flatnonzero(~(off <= _ON_SURFACE * room)):
@@ -75,7 +75,7 @@ def on_surface(name: str, surface: Surface, places: Floats) -> None:
 
 
 def cavities(rows: Iterable[Any], places: Floats) -> tuple[tuple[Surface, int, int], ...]:
-    """`rows` as (surface, carrier, point), each point on the admissible side."""
+    """Return `rows` as cavities (surface, carrier, point), each point on the admissible side."""
     result = []
     for row, given in each("cavities", rows, 3, "(surface, carrier, point)"):
         surface = _smooth(f"{row}[0]", given[0])

@@ -20,12 +20,12 @@ from .lanes.penalty_contact import Soft
 
 
 def ties_of(body: Body, penalty: float | None = None) -> Ties:
-    """The ties of its points; with a penalty its links are held by multipliers of Uzawa's loop."""
+    """Return the ties of a body; with a penalty its links are held by multipliers of Uzawa's loop."""
     ends = body.bonds()
     links, springs, edges = len(body.links), len(body.springs), len(body.strained())
     relaxed = 0 if penalty is None else links
     if penalty is not None:
-        # After the springs: like them they have a stiffness of their own.
+        # Relaxed links follow the springs: like springs they have a stiffness.
         ends = np.concatenate([ends[links : links + springs], ends[:links], ends[links + springs :]])
     tied = body.points[ends[:, 0]] - body.points[ends[:, 1]]
     rest, stiffness = (tied**2).sum(axis=1), np.zeros(len(ends))
@@ -56,50 +56,50 @@ def ties_of(body: Body, penalty: float | None = None) -> Ties:
 
 
 def led_points(body: Body) -> list[int]:
-    """The points that have a path."""
+    """The points with a path."""
     return [point for point, motion in body.anchors.items() if motion is not None]
 
 
 def _differences(ends: Pairs, points: int) -> Floats:
-    """(rows, P) +1 at the first point of each pair, -1 at the second."""
+    """Return the matrix (rows, P) with +1 at the first point of each pair, and -1 at the second."""
     unit = np.eye(points)
     return np.asarray(unit[ends[:, 0]] - unit[ends[:, 1]])
 
 
 def _combinations(body: Body) -> Floats:
-    """(K + G + C, P) contact points, points in guides, and points relative to the carriers of their cavities."""
+    """The coefficients (K + G + C, P) of contacts, guided points, and points relative to carriers of cavities."""
     held = np.eye(len(body))[[point for point, _surface in body.guides]]
     carried = np.array([(point, carrier) for _surface, carrier, point in body.cavities], np.int64).reshape(-1, 2)
     return np.concatenate([body.contacts, held, _differences(carried, len(body))])
 
 
 def walls_of(method: Method) -> Soft | None:
-    """The law of soft walls; None for rigid ones."""
+    """Return the law of soft walls; None for rigid walls."""
     if method.is_rigid():
         return None
     law = method.law()
     if not isinstance(method, AugmentedLagrangian):
         return Soft(law, math.inf, 1, False, 0.0)
-    # The gap at which V is the tolerance, alpha g^(a+1)/(a+1)
+    # The gap at which V = alpha g^(a+1)/(a+1) is the tolerance.
     power = method.exponent + 1.0
     deepest = (power * method.tolerance / method.penalty) ** (1.0 / power)
     return Soft(law, method.tolerance, method.max_sweeps, True, deepest)
 
 
 def most_contacts_of(touching: Touching, walls: Soft | None) -> int:
-    """Number of a body's contacts that are solved at once: where walls are springs, all that there can be."""
+    """The number of contacts of a body that are solved together: with soft walls, all possible ones."""
     if walls is None or walls.is_cut:
         return MOST_CONTACTS
     return max(1, touching.points * touching.walls + len(touching.plain) - touching.points - touching.guides)
 
 
 def own_surfaces(body: Body) -> list[Surface]:
-    """The surfaces of its guides and cavities."""
+    """Return the surfaces of the guides and cavities of a body."""
     return [surface for _point, surface in body.guides] + [surface for surface, _carrier, _point in body.cavities]
 
 
 def touching_of(body: Body, ties: Ties, compiled: CompiledScene, seeding: Seeding = UNSEEDED) -> Touching:
-    """Its points that may touch the walls of a scene, or those of its own guides and cavities."""
+    """Return the points of a body that may touch walls of a scene, or its own guides and cavities."""
     b = _combinations(body)
     single = ((b != 0.0).sum(axis=1) == 1) & (b.max(axis=1, initial=0.0) == 1.0)
     plain = np.where(single, b.argmax(axis=1), -1).astype(np.int64)

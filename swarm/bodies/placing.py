@@ -12,24 +12,24 @@ from ..surfaces.rotation import matrices
 from .body import Body
 from .copies import Bodies
 
-# The number of points with gaps found at once.
+# The number of points that are tested together.
 _BATCH = 1 << 19
-# The search ends after this many points if fewer than one body in a million was admissible.
+# The number of points after which the search ends if fewer than one body in a million was admissible.
 _TRIES = 20_000_000
-# How many points of each side and link are kept out of solids, which can be between corners.
+# The points of each side and link that must be out of solids, as a solid may be between corners.
 _SAMPLES = 8
 _INSTEAD = "swarm.Bodies(body, position, velocity)"
 
 
 def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float = 0.0, seed: int = 0) -> Bodies:
-    """n copies of a body at random, uniform over the places and orientations at which it is within the walls.
+    """Return n copies of a body at random, uniform over the places and orientations at which it is within the walls.
 
-    Copies may overlap, as bodies do not meet one another. Within means that all contact points are; where there are
-    solids, so are points of the links and of the sides of the faces.
+    Copies may overlap, as bodies do not meet one another. A body is within the walls if all its contact points are. In
+    a scene with solids, points on its links and on the sides of its faces must be within the walls too.
 
     Args:
         scene: its volume must be bounded.
-        body: without anchors, guides and cavities.
+        body: a body without anchors, guides and cavities.
         n: number of copies, 1 or more.
         speed: |v| of every centre of mass [m/s], from 0 to 1e100, in a direction uniform on the sphere.
         spin: |omega| of every copy [rad/s], from 0 to 1e100, about its centre of mass and an axis uniform on the
@@ -55,7 +55,7 @@ def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float =
     checks.particles_fit("n", n * len(body))
     speed, spin = checks.magnitude("speed", speed), checks.magnitude("spin", spin)
     random = np.random.default_rng(checks.seed("seed", seed))
-    # About the middle of what must be within, which is in any box around the scene.
+    # Places are those of the middle of the probes, which is in any box around the scene.
     probes = _probes(scene, body)
     turns, middles = _places(scene, probes, n, random)
     middle = probes.mean(axis=0)
@@ -66,8 +66,8 @@ def place(scene: Scene, body: Body, n: int, *, speed: float = 0.0, spin: float =
 
 
 def _probes(scene: Scene, body: Body) -> Floats:
-    """(Q, 3) points of the body that must be within the walls."""
-    # Not by BLAS: its last bit depends on the processor.
+    """The points (Q, 3) of the body that must be within the walls."""
+    # BLAS is not used, as its last bit depends on the processor.
     corners = np.einsum("kp,px->kx", body.contacts, body.points) if len(body.contacts) else body.points
     if not any(surface.is_solid() for surface in scene.surfaces):
         return corners
@@ -79,18 +79,18 @@ def _probes(scene: Scene, body: Body) -> Floats:
 
 
 def _places(scene: Scene, probes: Floats, n: int, random: np.random.Generator) -> tuple[Floats, Floats]:
-    """Rotation matrices (3, 3, n), and where the middles (3, n) of the probes are, of n copies within the walls."""
+    """Return the rotation matrices (3, 3, n), and the middles (3, n) of the probes, of n copies within the walls."""
     low, high = bounding_box(scene, "place", f"the bodies as arrays: {_INSTEAD}")
     arms = probes - probes.mean(axis=0)
     count = len(arms)
     turns, middles, found, tried = np.empty((3, 3, n)), np.empty((3, n)), 0, 0
     while found < n:
-        # Ever more at once, while none is found.
+        # The batches grow while no place is found.
         size = max(1, min(_BATCH // count, max(2 * (n - found) + 64, 0 if found else tried)))
         trial, turn = low + (high - low) * random.random((3, size)), _rotations(random, size)
         inside = np.ones(size, bool)
         for arm in arms:
-            # Each point only of those copies that have the points before it within.
+            # Each point is tested only for copies with all points before it within.
             left = np.flatnonzero(inside)
             places = trial[:, left] + _turned(turn[:, :, left], arm[None])[:, 0]
             inside[left] = scene.admits(places)
@@ -109,13 +109,13 @@ def _places(scene: Scene, probes: Floats, n: int, random: np.random.Generator) -
 
 
 def _rotations(random: np.random.Generator, n: int) -> Floats:
-    """(3, 3, n) rotation matrices, uniform on SO(3): of quaternions uniform on the sphere."""
+    """Return rotation matrices (3, 3, n), uniform on SO(3), from quaternions uniform on the sphere."""
     normal = random.standard_normal((4, n))
     return np.moveaxis(matrices((normal / np.sqrt((normal**2).sum(axis=0))).T), 0, 2)
 
 
 def _turned(turns: Floats, arms: Floats) -> Floats:
-    """(3, P, n) the points (P, 3) in n orientations."""
+    """Return the points (P, 3) in n orientations, (3, P, n)."""
     x, y, z = arms.T[:, :, None]
-    # Not by BLAS: its last bit depends on the processor.
+    # BLAS is not used, as its last bit depends on the processor.
     return np.asarray(turns[:, 0, None] * x + turns[:, 1, None] * y + turns[:, 2, None] * z)

@@ -12,22 +12,22 @@ from . import algebra, checked, covering, room
 from .body import Body
 from .checked import Pairs
 
-# Corners of a cube that are those of a regular tetrahedron: their second moments are 4 times the identity.
+# The corners of a cube that form a regular tetrahedron: their second moments are 4 times the identity.
 _CORNERS = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)])
 _ALL_PAIRS = list(itertools.combinations(range(4), 2))
 _OUTWARD = [(1, 3, 2), (0, 2, 3), (0, 3, 1), (0, 1, 2)]
-# A polyhedron thinner than this, relative to its widest direction, is flat: its six links have no digits.
+# A polyhedron thinner than this, relative to its widest direction, is flat: its six links would have no digits.
 _FLAT = 1e-4
-# A volume is round-off if it is less than this times that of a cube of the largest extent.
+# The volume, relative to a cube of the largest extent, below which a volume is round-off.
 _EMPTY = 1e-12
 
 
 def dumbbell(length: float, mass: float) -> Body:
-    """Two equal mass points at the ends of a link along x.
+    """Return two equal mass points at the ends of a link along x.
 
     Args:
-        length: of the link, above 0 [m].
-        mass: of the whole body, above 0 [kg].
+        length: the length of the link, above 0 [m].
+        mass: the mass of the whole body, above 0 [kg].
 
     Returns:
         The body; its centre is the origin.
@@ -42,12 +42,12 @@ def dumbbell(length: float, mass: float) -> Body:
 
 
 def chain(n: int, length: float, mass: float) -> Body:
-    """Equal mass points in a line along x, each linked to the next.
+    """Return equal mass points in a line along x, each linked to the next.
 
     Args:
-        n: number of points, from 2 to some 3000: the matrices of a body are full.
-        length: of the whole chain, above 0 [m]; each of its n - 1 links is length/(n - 1) long.
-        mass: of the whole chain, above 0 [kg]; each point has mass/n.
+        n: number of points, from 2 to some 3000, as the matrices of a body are full.
+        length: the length of the whole chain, above 0 [m]; each of its n - 1 links is length/(n - 1) long.
+        mass: the mass of the whole chain, above 0 [kg]; each point has mass/n.
 
     Returns:
         The body; its centre is the origin.
@@ -67,11 +67,11 @@ def chain(n: int, length: float, mass: float) -> Body:
 
 
 def tetrahedron(edge: float, mass: float) -> Body:
-    """Four equal mass points at the corners of a regular tetrahedron, all linked.
+    """Return four equal mass points at the corners of a regular tetrahedron, all linked.
 
     Args:
-        edge: length of each of its six links, above 0 [m].
-        mass: of the whole body, above 0 [kg].
+        edge: the length of each of its six links, above 0 [m].
+        mass: the mass of the whole body, above 0 [kg].
 
     Returns:
         The body; its centre is the origin. The homogeneous solid is `rigid(tetrahedron(...).points, density)`.
@@ -89,22 +89,22 @@ def tetrahedron(edge: float, mass: float) -> Body:
 def rigid(
     vertices: ArrayLike, density: float, faces: ArrayLike | None = None, contacts: ArrayLike | None = None
 ) -> Body:
-    """A rigid homogeneous polyhedron.
+    """Return a rigid homogeneous polyhedron.
 
-    Its four base points are mass points of a quarter of its mass each, placed so that their centre and their inertia
-    are exactly those of the solid. The vertices are its contact points; between them nothing touches a wall, so a solid
-    that is smaller than a face, or a corner of one, passes into the body unless `contacts` are closer than it is wide.
+    Its four base points have a quarter of its mass each, at places that give exactly the centre and the inertia of the
+    solid. Its contact points are the vertices. Between them nothing touches a wall: a solid smaller than a face, or a
+    corner of a solid, passes into the body unless `contacts` are closer than it is wide.
 
     Args:
         vertices: (K, 3) corners [m].
         density: above 0 [kg/m^3].
         faces: (F, 3) triangles of vertices, closed, anticlockwise seen from outside; None: the convex hull, which needs
             SciPy.
-        contacts: what touches walls besides the vertices: a number, points on the edges and in the faces that are at
-            most so far from their neighbours [m]; or points (Q, 3) anywhere in the body [m].
+        contacts: the points that touch walls besides the vertices: a number, the largest distance of neighbours on the
+            edges and in the faces [m]; or points (Q, 3) anywhere in the body [m].
 
     Returns:
-        The body; vertex k is its contact point k, where it was given, and the other contact points follow.
+        The body; vertex k is its contact point k, at the given place, and the other contact points follow.
 
     Raises:
         SceneError: an argument is out of its range; the vertices lie in a plane; the faces are not closed, or do not
@@ -127,7 +127,7 @@ def rigid(
     root, inverse = (algebra.product(axes * scales, axes.T) for scales in (np.sqrt(squares), 1.0 / np.sqrt(squares)))
     base = center + algebra.product(_CORNERS, root)
     touching = np.concatenate([corners, _between(corners, triangles, contacts)])
-    # Weights of the base points, which add up to 1, that give each of these; all of 1/4 give the centre.
+    # The weights of the base points, which add up to 1, for each contact point; weights of 1/4 give the centre.
     weights = np.full((len(touching), 4), 0.25)
     for _improvement in range(2):
         missing = touching - algebra.product(weights, base)
@@ -136,7 +136,7 @@ def rigid(
 
 
 def _between(corners: Floats, triangles: Pairs, contacts: ArrayLike | None) -> Floats:
-    """The contact points (Q, 3) that are no corners."""
+    """Return the contact points (Q, 3) besides the corners."""
     if contacts is None:
         return np.zeros((0, 3))
     if checks.array("contacts", contacts).ndim == 0:
@@ -152,14 +152,14 @@ def _flat(corners: Floats) -> SceneError:
 
 
 def _hull(corners: Floats) -> Pairs:
-    """The triangles of the convex hull, anticlockwise seen from outside."""
+    """Return the triangles of the convex hull, anticlockwise seen from outside."""
     from ..common.extras import needed_by
 
     with needed_by("a rigid body without faces", "bodies"):
         from scipy.spatial import ConvexHull, QhullError
     size = np.ptp(corners, axis=0).max()
     try:
-        # Relative to their middle and extent: Qhull's tolerances are absolute.
+        # Corners are relative to their middle and their extent, as the tolerances of Qhull are absolute.
         hull = ConvexHull((corners - corners.mean(axis=0)) / (size or 1.0))
     except (QhullError, ValueError):
         raise _flat(corners) from None
@@ -171,7 +171,7 @@ def _hull(corners: Floats) -> Pairs:
 
 
 def _closed(corners: Floats, faces: ArrayLike) -> Pairs:
-    """`faces` as triangles: each of their sides is run through once in both directions."""
+    """Return `faces` as triangles of a closed surface, which traverse each side once in each direction."""
     triangles = checked.numbers("faces", faces, 3, len(corners))  # type: ignore[arg-type]
     if not len(triangles):
         raise SceneError(
@@ -195,7 +195,7 @@ def _closed(corners: Floats, faces: ArrayLike) -> Pairs:
 
 
 def _moments(corners: Floats, triangles: Pairs) -> tuple[float, Floats, Floats]:
-    """Volume, centroid, and second moment about it by volume (3, 3), from the tetrahedra that triangles span."""
+    """Return volume, centroid, and second moment about it per volume (3, 3), from the tetrahedra of the triangles."""
     middle = corners.mean(axis=0)
     sides = (corners - middle)[triangles]
     volumes = algebra.determinants(sides) / 6.0
@@ -206,7 +206,7 @@ def _moments(corners: Floats, triangles: Pairs) -> tuple[float, Floats, Floats]:
         raise SceneError(
             f"faces must be anticlockwise seen from outside, got a volume of {volume:g} m^3; reverse every face"
         )
-    # Of a tetrahedron with a corner at 0: integral of x = V/4 sum a, of x x^T = V/20 (sum a a^T + sum a sum a^T).
+    # For a tetrahedron with a corner at 0, the integral of x is V/4 sum a, of x x^T V/20 (sum a a^T + sum a sum a^T).
     center = (volumes[:, None] * sums).sum(axis=0) / (4.0 * volume)
     squares = np.einsum("f,fax,fay->xy", volumes, sides, sides) + np.einsum("f,fx,fy->xy", volumes, sums, sums)
     return volume, middle + center, squares / (20.0 * volume) - np.outer(center, center)

@@ -1,6 +1,7 @@
-"""Bodies to and from plain tables, the form that scene files and trajectories hold.
+"""Bodies to and from plain tables, the form in scene files and trajectories.
 
-A table of the kind "points" has the arguments of `Body`, every number exactly; the other kinds are those that are made.
+A table of the kind "points" has the arguments of `Body`, every number exactly. The other kinds have the arguments of
+the functions that make bodies.
 """
 
 import dataclasses
@@ -36,9 +37,9 @@ _MOTIONS = {"translation": Translation, "oscillation": Oscillation, "rotation": 
 
 @dataclass(frozen=True, kw_only=True)
 class Made(Validated):
-    """Keys of every kind of [body]: how many copies there are, and how they are placed."""
+    """The keys of every kind of [body]: the number of copies, and their random start."""
 
-    # The function that makes the body of the other keys.
+    # The function that makes the body from the other keys.
     maker: ClassVar[Callable[..., Body]]
     count: Count | None = None
     speed: Magnitude | None = None
@@ -47,16 +48,16 @@ class Made(Validated):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        # Its arguments are wrong or right as the file is read, not when the copies are placed.
+        # The arguments are checked when the file is read, not when the copies are placed.
         self.body()
 
     def body(self) -> Body:
-        """The body that is described."""
+        """Return the body that is described."""
         own = [field.name for field in dataclasses.fields(self) if field.name not in Made.__dataclass_fields__]
         return type(self).maker(**{name: getattr(self, name) for name in own})
 
     def start(self, scene: Scene) -> Bodies:
-        """The copies at the start.
+        """Return the copies at the start.
 
         Raises:
             SceneError: a value is out of its range, or the copies cannot be placed.
@@ -69,7 +70,7 @@ class Made(Validated):
 
 
 def _made_by(maker: Callable[..., Body]) -> type[Made]:
-    """The keys of a kind that has for its own the arguments of a function."""
+    """Return the class of the keys of a kind: the arguments of a function, and the keys of every kind."""
     own = [(one.name, one.annotation) for one in inspect.signature(maker).parameters.values()]
     name, known = maker.__name__, {"maker": maker}
     return dataclasses.make_dataclass(name, own, bases=(Made,), namespace=known, frozen=True, kw_only=True)
@@ -77,7 +78,7 @@ def _made_by(maker: Callable[..., Body]) -> type[Made]:
 
 @dataclass(frozen=True, kw_only=True)
 class Rigid(Made):
-    """Arguments of `rigid`."""
+    """The arguments of `rigid`."""
 
     maker = shapes.rigid
     vertices: tuple[Vector, ...]
@@ -88,7 +89,7 @@ class Rigid(Made):
 
 @dataclass(frozen=True, kw_only=True)
 class Elastic(Made):
-    """Arguments of `elastic`, for a block of these lengths that is cut into so many cells along each."""
+    """The arguments of `elastic`, for a block with `lengths` that is cut into `cells` along each axis."""
 
     lengths: Vector
     cells: tuple[int, int, int]
@@ -98,13 +99,13 @@ class Elastic(Made):
     mass: str = "lumped"
 
     def body(self) -> Body:
-        """A block of tetrahedra."""
+        """Return a block of tetrahedra."""
         return elastic(block(self.lengths, self.cells), self.young, self.poisson, self.density, self.mass)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Points(Made):
-    """Arguments of `Body`; without a count there is one, where its points are."""
+    """The arguments of `Body`; without a count there is one copy, at the given points."""
 
     points: tuple[Vector, ...]
     velocity: tuple[Vector, ...] | None = None
@@ -121,7 +122,7 @@ class Points(Made):
     faces: tuple[tuple[int, int, int], ...] = ()
 
     def body(self) -> Body:
-        """The body with these arguments."""
+        """Return the body with these arguments."""
         return Body(
             self.points,
             self.mass,
@@ -140,7 +141,7 @@ class Points(Made):
         )
 
     def start(self, scene: Scene) -> Bodies:
-        """The copies at the start, or the one where its points are."""
+        """Return the copies at the start, or the one copy at the given points."""
         if self.count is not None:
             for name in ("velocity", "project"):
                 if getattr(self, name):
@@ -165,7 +166,7 @@ KINDS: dict[str, type[Made]] = {
 
 @dataclass(frozen=True)
 class _Strain:
-    """`Strain`, with those entries (i, j, K_ij) of its matrix that are not 0: each edge meets few others."""
+    """A `Strain` with the entries (i, j, K_ij) of its matrix that are not 0, as each edge meets few others."""
 
     edges: tuple[tuple[int, int], ...]
     rest: tuple[float, ...]
@@ -196,7 +197,7 @@ class _Cavity:
 
 
 def _anchors(given: tuple[Any, ...]) -> dict[int, Any]:
-    """The motions of points, or None where a table has no kind."""
+    """Return the motions of points, None for a table without a kind."""
     found: dict[int, Any] = {}
     for k, table in enumerate(given):
         where = f"anchors[{k}]"
@@ -210,7 +211,7 @@ def _anchors(given: tuple[Any, ...]) -> dict[int, Any]:
 
 
 def _surfaces(name: str, given: tuple[Any, ...], cls: type[T]) -> Iterator[T]:
-    """Tables as guides or cavities, each with its surface."""
+    """Yield tables as guides or cavities, each with its surface."""
     for k, table in enumerate(given):
         found: Any = tables.convert(table, cls, f"{name}[{k}]")
         yield dataclasses.replace(found, surface=tables.of_kind(found.surface, f"{name}[{k}].surface", ALL_SURFACES))
@@ -220,16 +221,16 @@ def _surfaces(name: str, given: tuple[Any, ...], cls: type[T]) -> Iterator[T]:
 
 
 def body_of(table: Any) -> Body:
-    """The body of a table that `table_of` made.
+    """Return the body of a table that `table_of` made.
 
     Raises:
-        SceneError: the table is not one of a body.
+        SceneError: the table does not describe a body.
     """
     return tables.of_kind(table, "body", {"points": Points}).body()
 
 
 def table_of(body: Body) -> dict[str, Any]:
-    """The table of a body, of the kind "points": `body_of` makes the same body of it, to the last bit.
+    """Return the table of a body, of the kind "points", from which `body_of` makes the same body to the last bit.
 
     >>> table_of(Body([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], mass=0.5, links=[(0, 1)]))["links"]
     [[0, 1]]
@@ -266,7 +267,7 @@ def table_of(body: Body) -> dict[str, Any]:
 
 
 def _contacts(rows: Floats) -> list[Any]:
-    """The numbers of points where every row is a point, else the coefficients."""
+    """Return the numbers of points if every row is a point, else the coefficients."""
     numbers = rows.argmax(axis=1)
     same = (rows == np.eye(rows.shape[1])[numbers]).all()
     return list(numbers.tolist() if same else rows.tolist())

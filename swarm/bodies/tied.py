@@ -1,4 +1,4 @@
-"""The ties of a body, links and guides: which of them are redundant, and which paths of led points are too long."""
+"""The ties of a body, links and guides: checks for redundant ties, and for paths of led points that are too long."""
 
 import heapq
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,31 +14,31 @@ from ..surfaces.rotation import normalized
 from ..surfaces.surface import Surface
 from .checked import Pairs, modes_unless_above
 
-# Links depend on each other where their directions agree to the square root of this: their system of equations has
-# the inverse of it as condition, and multipliers have no digit then.
+# Links are dependent where their directions agree to the square root of this. The condition of their system of
+# equations is then the inverse of this number, and multipliers have no digit.
 _DEPENDENT = 1e-12
-# Directions at a point are clearly independent where no eigenvalue of their products is below this: an angle of 8
-# degrees between two.
+# Directions at a point are clearly independent where no eigenvalue of their products is below this: between two
+# directions, an angle of 8 degrees.
 _CLEAR = 1e-2
-# A link takes part in a dependence if its share of it is not round-off.
+# A link takes part in a dependence if its coefficient is above this round-off.
 _SHARE = 1e-5
-# Errors of distances that are round-off, relative.
+# The relative round-off of distances.
 _ROUND_OFF = 1e-9
-# Instants and periods at which led points are looked at. Two motions of different rates meet in all ways in some
-# tens of periods of the slower one.
+# The instants at which led points are compared, and the periods that they cover. Two motions of different rates reach
+# nearly all relative phases in some tens of periods of the slower one.
 _INSTANTS, _PERIODS = 4001, 20.0
-# So many are named in a sentence.
+# The most ties that a sentence names.
 _NAMED = 12
 
 
 class Tie(NamedTuple):
-    """A link or a guide: along its normal its point has no velocity, or its two points have the same.
+    """A link or a guide: its two points have the same velocity along its normal, or its one point has none.
 
     Attributes:
         name: "links[0]" or "guides[0]".
-        points: the two points of a link, or the one in a guide.
-        normal: (3, n) unit vectors of n copies; a link's is that of its first point, its second has the opposite.
-        surface: of the guide.
+        points: the two points of a link, or the one point of a guide.
+        normal: (3, n) unit vectors of n copies, at the first point of a link; the second point has the opposite one.
+        surface: the surface of a guide, None for a link.
     """
 
     name: str
@@ -47,13 +47,13 @@ class Tie(NamedTuple):
     surface: Surface | None = None
 
     def ends(self) -> Iterator[tuple[int, float]]:
-        """Its points, each with the sign of its normal."""
+        """The points of the tie, each with the sign of its normal."""
         return zip(self.points, (1.0, -1.0), strict=False)
 
 
 def ties(links: Pairs, guides: Sequence[tuple[int, Surface]], position: Floats) -> Iterator[Tie]:
-    """The links and guides of n copies with points at `position` (3, P, n)."""
-    # One at a time: of many copies each is large.
+    """Yield the links and guides of n copies with points at `position` (3, P, n)."""
+    # One at a time, as the normals of many copies are large.
     for k, (i, j) in enumerate(links.tolist()):
         yield Tie(f"links[{k}]", (i, j), normalized(position[:, i] - position[:, j]))
     for k, (point, surface) in enumerate(guides):
@@ -64,7 +64,7 @@ def ties(links: Pairs, guides: Sequence[tuple[int, Surface]], position: Floats) 
 def require_independent(
     points: Floats, links: Pairs, anchors: Mapping[int, Any], guides: Sequence[tuple[int, Surface]]
 ) -> None:
-    """Raise unless the forces of links and guides are determined: their directions must be independent."""
+    """Raise a `SceneError` unless the directions of links and guides are independent, so that forces are determined."""
     given = list(ties(links, guides, points.T[:, :, None]))
     left = _left(given, anchors, len(points))
     null = _dependences([given[k] for k in left], anchors)
@@ -76,7 +76,7 @@ def require_independent(
     ]
     involved = [names[k] for k, row in zip(left, np.abs(null), strict=True) if row.max() > _SHARE]
     listing = ", ".join(involved[:_NAMED]) + (f" and {len(involved) - _NAMED} more" if len(involved) > _NAMED else "")
-    # Somewhere else the same links may be independent: then it is the place of the points that is special.
+    # If the same links are independent elsewhere, the places of the points are special.
     size = np.ptp(points, axis=0).max()
     elsewhere = points + 0.1 * size * np.random.default_rng(0).standard_normal(points.shape)
     moved = list(ties(links, guides, elsewhere.T[:, :, None]))
@@ -94,10 +94,10 @@ def require_independent(
 
 
 def _left(given: Sequence[Tie], anchors: Mapping[int, Any], count: int) -> list[int]:
-    """The ties of one body with an independence that is not seen point by point: of a chain or a tree none.
+    """Return the ties of a body with an independence that is not evident point by point: none in a chain or a tree.
 
-    Where those at a point, at most three, are clearly independent of each other, no others can be combined to cancel
-    them there: they take part in no dependence, and are left out, with what that frees at their other ends.
+    If the ties at a point, at most three, are clearly independent, no combination cancels there: these ties take part
+    in no dependence, and are left out. Then the points at their other ends have fewer ties.
     """
     at: list[dict[int, Floats]] = [{} for _point in range(count)]
     for number, tie in enumerate(given):
@@ -117,7 +117,7 @@ def _left(given: Sequence[Tie], anchors: Mapping[int, Any], count: int) -> list[
 
 
 def _dependences(given: Sequence[Tie], anchors: Mapping[int, Any]) -> Floats:
-    """(ties, D) combinations of the directions of ties of one body that vanish."""
+    """Return the combinations (ties, D) of the directions of ties of one body that vanish."""
     free = sorted({point for tie in given for point in tie.points} - set(anchors))
     place = {point: k for k, point in enumerate(free)}
     directions = np.zeros((len(given), len(free), 3))
@@ -126,14 +126,14 @@ def _dependences(given: Sequence[Tie], anchors: Mapping[int, Any]) -> Floats:
             if point in place:
                 row[place[point]] = sign * tie.normal[:, 0]
     rows = normalized(directions.reshape(len(given), 3 * len(free)), 1)
-    # All clearly independent where no eigenvalue is below this, round-off and all.
+    # All directions are independent if no eigenvalue is below this bound, which includes round-off.
     bound = 10.0 * _DEPENDENT + 8.0 * len(given) * EPSILON
     modes = modes_unless_above(bound, rows @ rows.T) if given else None
     return np.zeros((len(given), 0)) if modes is None else modes[1][:, modes[0] < _DEPENDENT]
 
 
 def require_reachable(points: Floats, links: Pairs, anchors: Mapping[int, Motion | None]) -> None:
-    """Raise if led points leave each other farther than their links allow."""
+    """Raise a `SceneError` if led points move farther apart than their links allow."""
     if len(anchors) < 2 or not len(links):
         return
     paths = {point: led(motion, points[point]) for point, motion in anchors.items()}
@@ -148,7 +148,7 @@ def require_reachable(points: Floats, links: Pairs, anchors: Mapping[int, Motion
             raise SceneError(
                 f"links[{k}], {(i, j)}, must tie a point that can move, got two that are anchored; leave it out"
             )
-    # Fixed points are where they are, and there the links have their lengths.
+    # The distances between fixed points never change, so that one of each pair must be led.
     moving = [point for point in sorted(paths) if anchors[point] is not None]
     for i in moving:
         reach = _reach(points, links, i)
@@ -163,9 +163,9 @@ def require_reachable(points: Floats, links: Pairs, anchors: Mapping[int, Motion
 
 
 def _distances(first: Led, second: Led, drift: bool = True) -> Floats:
-    """Distance of two led points at many instants.
+    """The distances of two led points at many instants.
 
-    Without drift: 0 where their steady velocities differ, since then it depends on how long the run is.
+    If not `drift`: 0 if their steady velocities differ, as the largest distance then depends on the length of the run.
     """
     rates = [abs(path.rate) for path in (first, second) if path.rate]
     slowest = min(rates, default=1.0)
@@ -176,7 +176,7 @@ def _distances(first: Led, second: Led, drift: bool = True) -> Floats:
 
 
 def _reach(points: Floats, links: Pairs, start: int) -> dict[int, float]:
-    """The lengths of the shortest ways along links from a point, to each that can be reached (Dijkstra)."""
+    """The lengths of the shortest ways along links from a point to each point that can be reached (Dijkstra)."""
     lengths = np.sqrt(((points[links[:, 0]] - points[links[:, 1]]) ** 2).sum(axis=1)).tolist()
     ways: dict[int, list[tuple[float, int]]] = {}
     for (i, j), length in zip(links.tolist(), lengths, strict=True):

@@ -1,4 +1,4 @@
-"""Checks of particles with a radius before a run starts."""
+"""Checks of balls before a run starts."""
 
 import numpy as np
 
@@ -16,20 +16,20 @@ from ..state import Floats
 from ..surfaces.rotation import normalized
 from ..surfaces.surface import shown
 
-# Balls overlap by round-off of their places at the start: this many times that of the largest coordinate.
+# Balls may overlap at the start by round-off of their places: by this factor times the largest coordinate.
 _ROUND_OFF = 64.0 * np.finfo(np.float64).eps
-# Balls that touch walls are moved by the first part of that coordinate, to find the walls that stop them; the second is
-# the step of differences of their distances.
+# Balls that touch walls are moved by the part `_MOVED` of that coordinate, to find the walls that stop them; `_STEP` is
+# the relative step of the differences of their distances.
 _MOVED, _STEP = 1e-6, 1e-7
-# Walls face each other where the cosine of the angle between their normals is less than this above -1.
+# Walls face each other if the cosine of the angle between their normals is less than this above -1.
 _FACING = 1e-6
 
 
 def require_balls(scene: Scene, particles: Particles, method: Method) -> None:
-    """Raise a `SceneError` where balls do not fit the scene, the cell or the steps.
+    """Raise a `SceneError` if balls do not fit the scene, the cell or the steps.
 
-    Where contacts turn balls that have no spin, they get one of 0. Rigid balls without one are turned by friction of
-    pairs only: walls act on them as on points.
+    Balls without a spin get a spin of 0 where contacts turn them. Only friction of pairs turns rigid balls without a
+    spin: walls act on them as on points.
     """
     assert particles.radius is not None
     require_shapes(scene, particles.radius)
@@ -47,7 +47,7 @@ def _may_turn(scene: Scene, method: Method) -> bool:
 
 
 def _require_cell(scene: Scene, particles: Particles, method: Method) -> None:
-    """Raise a `SceneError` where a ball that meets at instants could meet two images of another one."""
+    """Raise a `SceneError` where a rigid ball could meet two images of another ball."""
     largest = 2.0 * float(particles.radius.max())  # type: ignore[union-attr]
     for k, length in enumerate(scene.period or () if method.is_rigid() else ()):
         if length is not None and length < 2.0 * largest:
@@ -58,7 +58,7 @@ def _require_cell(scene: Scene, particles: Particles, method: Method) -> None:
 
 
 def require_apart(scene: Scene, particles: Particles, method: Method) -> None:
-    """Raise a `SceneError` where balls overlap one another, or are outside their walls, at the start."""
+    """Raise a `SceneError` if balls overlap one another, or are outside their walls, at the start."""
     radius = particles.radius
     assert radius is not None
     magnitude = max(float(np.abs(particles.position).max()), scene.finite_size())
@@ -84,7 +84,7 @@ def require_apart(scene: Scene, particles: Particles, method: Method) -> None:
 
 def _require_within(scene: Scene, particles: Particles, radius: np.ndarray, close: float, is_rigid: bool) -> None:
     distances = scene.distances_outside(particles.position, 0.0, radius)
-    # Where phi is not a number a ball is outside.
+    # A ball at which phi is NaN is outside.
     wrong = ~(distances <= (close if is_rigid else close + MOST_PRESSED * radius))
     outside = np.flatnonzero(wrong.any(axis=0))
     if not outside.size:
@@ -93,7 +93,7 @@ def _require_within(scene: Scene, particles: Particles, radius: np.ndarray, clos
 
 
 def _require_room(scene: Scene, particles: Particles, magnitude: float) -> None:
-    """Raise a `SceneError` where a ball that touches facing walls moves from one to the other: that takes no time."""
+    """Raise a `SceneError` where a ball that fills the gap between facing walls moves across it: that takes no time."""
     assert particles.radius is not None
     place, radius = particles.position, particles.radius
     touches = (scene.distances_outside(place, 0.0, radius) >= -_ROUND_OFF * magnitude).any(axis=0)
@@ -122,7 +122,7 @@ def _require_room(scene: Scene, particles: Particles, magnitude: float) -> None:
 
 
 def _kept(scene: Scene, place: Floats, radius: Floats) -> tuple[Floats, Floats]:
-    """How far balls at places (3, N) are outside [m], and the unit normals of the walls that they are out of."""
+    """Return how far balls at places (3, N) are outside of the walls [m], and the unit normals of these walls."""
     distance = scene.distances_outside(place, 0.0, radius)
     wall, each = distance.argmax(axis=0), np.arange(place.shape[1])
     step = _STEP * max(float(np.abs(place).max()), float(radius.max()))

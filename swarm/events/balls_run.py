@@ -55,12 +55,12 @@ class CollidingRun(BaseRun):
         every = scenery_of(compiled, 0.0).each_laws()
         loses = any(one.may_dissipate or one.loses for one in every) or box.loss is not None or rough
         ends = any(one.may_end for one in every)
-        # How often each has collided is in its rows.
+        # The number of collisions of each ball is in its rows.
         met, rounds = self._flock.tag.reshape(n, WHOLES)[:, MET], self._flock.link.reshape(n, WHOLES)[:, FACE]
         balls = Balls(particles.radius, met, np.zeros(1), particles.spin, rounds)
-        # The energy of each ball is not kept.
+        # The energies of balls are not kept.
         unused = np.broadcast_to(0.0, n)
-        # Times are those of the start of each flight: so what is written at frames is no part of the motion.
+        # The times of flights are those of their start, so that frames have no influence on the motion.
         self.state = State(
             particles.position, particles.velocity, particles.mass, *2 * (unused,),
             np.zeros(n, np.int64), np.zeros((2 * rows if scene.moves() else rows, 1)), np.zeros(n if loses else 0),
@@ -96,11 +96,11 @@ class CollidingRun(BaseRun):
         self._choose_tier()
 
     def _is_clear(self, place: Floats, radius: float, moment: float) -> bool:
-        """Whether a ball at a place (3,) is clear of the walls that have a mass."""
+        """Whether a ball at a place (3,) is clear of the walls with a mass."""
         return True
 
     def _with_heavy(self, compiled: CompiledScene, box: Any) -> Any:
-        """What the balls are in, with walls that have a mass."""
+        """The `Domain` of the balls, with the walls with a mass."""
         return box
 
     def _prepare(self, span: float, moment: float) -> None:
@@ -132,11 +132,11 @@ class CollidingRun(BaseRun):
         return status, ball
 
     def _with_log(self, page: ThreadLog | None) -> Any:
-        """What the balls are in, with the log that is filled now."""
+        """The `Domain` of the balls, with the log to be filled."""
         return self._box if page is None else self._box._replace(watchers=page.watched_by(self._box.watchers))
 
     def _follow(self, moment: float, page: ThreadLog | None) -> None:
-        """Tell the counters of all flights until the end of a frame."""
+        """Count the crossings of all flights until the end of a frame."""
         followed, now = 0, self._since(moment)
         while followed < self.state.mass.size:
             followed = self._call(
@@ -146,7 +146,7 @@ class CollidingRun(BaseRun):
                 page.turn()
 
     def _feed_in(self, moment: float) -> None:
-        """Let those come that are due at a moment [s]."""
+        """Add the balls that are due at a moment [s]."""
         assert self._feed is not None
         now = self._since(moment)
         born = self._feed.come(moment, There(*there_at(self._flock, self._balls.radius, self._box.pull, now)))
@@ -167,11 +167,11 @@ class CollidingRun(BaseRun):
         self._in_parts(events.show, self._box, self._flock, self.state, now, last=self.state.mass.size)
 
     def _since(self, moment: float) -> float:
-        """A moment in the time of the epoch [s]."""
+        """Return a moment [s] as a time of the epoch [s]."""
         return float(moment - self._clock[EPOCHS] * self._clock[LENGTH])
 
     def _next_window(self) -> None:
-        """Begin the next window of walls that move, come or go, in which all balls look for their walls anew."""
+        """Begin the next window of walls that move or become absent or present; all balls look for their walls anew."""
         windows = self._windows
         assert windows is not None
         instant, now = windows.instant(), float(windows.numbers[END])
@@ -186,16 +186,16 @@ class CollidingRun(BaseRun):
         self._look_anew(now)
 
     def _scene_at(self, instant: float) -> Scene:
-        """The scene, as far as its motions do not say where its walls are at an instant [s]."""
+        """The scene with the walls with a mass at their places at an instant [s]."""
         return self._scene
 
     def _look_anew(self, now: float) -> None:
-        """Find what is next for every ball from a time of the epoch on [s]; negative: at the start."""
+        """Find the next event of every ball after a time of the epoch [s]; a negative time is the start of the run."""
         self._in_chunks(events.begin, self._box, self._flock, now)
         self._call(events.order, self._flock)
 
     def _set_window(self) -> None:
-        """The walls of the window, and which cells are near them."""
+        """Set the walls of the window, and mark the cells near them."""
         if self._windows is not None:
             scenery, gates = self._windows.scenery(), self._box.gates
             if gates is not None:
@@ -210,7 +210,7 @@ class CollidingRun(BaseRun):
         return failures.after(self._scene_at(now), moment - span, item, status, place, now, radius)
 
     def collisions(self) -> float:
-        """How many there were since the start."""
+        """The number of collisions since the start."""
         return float(self._clock[COLLISIONS])
 
     def _now(self) -> float:

@@ -1,4 +1,4 @@
-"""The run of balls that meet one another, and walls of which some have a mass."""
+"""The run of rigid balls in a scene in which some walls have a mass."""
 
 from typing import Any
 
@@ -57,7 +57,7 @@ class HeavyRun(CollidingRun):
         super()._begin()
 
     def _walls_seen(self, moment: float) -> Any:
-        """The walls are brought to the moment in a copy: a frame is no part of their motion."""
+        """Return the walls at a moment [s], moved there in a copy, as frames have no influence on the motion."""
         freedoms, since = Freedoms(*(array.copy() for array in self._freedoms)), self._since(moment)
         scenery = scenery_of(self._compiled, moment)
         bring_walls(scenery, freedoms, since)

@@ -1,4 +1,4 @@
-"""Balls that fill more of a volume than random places can."""
+"""Dense random packings of balls, which random places alone cannot reach."""
 
 import math
 from dataclasses import replace
@@ -20,16 +20,17 @@ from ..state import Floats
 from ..surfaces.surface import Surface
 from .growing_run import grow
 
-# The largest packings that are grown, of random balls, of discs; and those that are known to end it.
+# The largest packings that are grown, of balls and of discs; and known limits of packings, with their sentences.
 _MOST = {3: 0.6, 2: 0.8}
 _EVER, _RANDOM = "no arrangement of equal ones fills", "none at random fill"
 _LIMITS = {
     3: ((math.pi / math.sqrt(18.0), _EVER), (0.64, _RANDOM)),
     2: ((math.pi / math.sqrt(12.0), _EVER), (0.84, _RANDOM)),
 }
-# Growth begins at random places in which the balls fill so much, or less where these are not found.
+# Growth begins at random places at a packing of `_BEGIN`. Where none are found, the radii are reduced by the factor
+# `_LESS`, in at most `_TRIES` tries.
 _BEGIN, _LESS, _TRIES = {3: 0.2, 2: 0.3}, 0.7, 6
-# A number of balls fills what is asked to this part of one of them.
+# The relative round-off of a number of balls, and of a packing.
 _CLOSE = 1e-9
 
 
@@ -44,21 +45,21 @@ def pack(
     temperature: float | None = None,
     mass: ArrayLike = 1.0,
 ) -> Particles:
-    """Balls that fill a part of the admissible volume of a scene, up to 0.6 of it, in a plane 0.8.
+    """Return balls that fill a part of the admissible volume of a scene, up to 0.6 of it, in a plane 0.8.
 
-    They begin smaller at random places, as in `fill`, and grow while they fly, collide, and keep within the walls as
-    they are at 0 s (the method of Lubachevsky and Stillinger). The places are random but not in equilibrium: let the
-    balls fly for some collisions where that matters.
+    The balls begin smaller at random places, as in `fill`. They grow while they fly and collide within the walls at
+    0 s (the method of Lubachevsky and Stillinger). Their places are random but not in equilibrium: let the balls fly
+    for some collisions where that matters.
 
     Args:
         scene: its volume must be bounded.
-        n: number of balls, 1 or more; None: as many of the radius as fill the fraction, at most.
-        radius: one number or (n,) [m], above 0; None: that of n equal balls that fill the fraction.
-        fraction: of the admissible volume that the balls fill, from 0 to 0.6, in a plane of the area to 0.8; None:
-            what n balls of the radius fill. With n and a fraction, radii of each ball are relative to one another: they
-            are scaled to the fraction.
+        n: number of balls, 1 or more; None: the largest number of balls of the radius within the fraction.
+        radius: one number or (n,) [m], above 0; None: the radius of n equal balls that fill the fraction.
+        fraction: the part of the admissible volume that the balls fill, from 0 to 0.6, in a plane of the area from 0
+            to 0.8; None: the part that n balls of the radius fill. With n and a fraction, radii of each ball are
+            relative: they are scaled to the fraction.
         seed: the same seed gives the same balls.
-        speed: |v| of every ball [m/s], as in `fill`; without it and a temperature the balls are at rest.
+        speed: |v| of every ball [m/s], as in `fill`; without a speed and a temperature the balls are at rest.
         temperature: k_B T [J], as in `fill`.
         mass: one number or (n,) [kg], above 0.
 
@@ -66,9 +67,8 @@ def pack(
         The particles, with their `radius`, and their `volume`, as `fill` gives it.
 
     Raises:
-        SceneError: fewer than two of n, radius and fraction are given, or all three with one number as the radius, an
-            argument is out of its range, the balls are too large for the vessel, or jam before they are as large as
-            asked.
+        SceneError: fewer than two of n, radius and fraction are given, or all three with one number as the radius; an
+            argument is out of its range; the balls are too large for the vessel, or jam before they have grown.
 
     >>> import swarm
     >>> box = swarm.Scene(surfaces=[swarm.Box((0.5, 0.5, 0.5))])
@@ -97,7 +97,7 @@ def pack(
 
 
 def _radii(scene: Scene, n: int | None, radius: ArrayLike | None, fraction: float | None, room: VolumeBox) -> Floats:
-    """The radii, from two of the three, or all."""
+    """Return the radii (N,) [m], from two of n, radius and fraction, or from all."""
     given = {"n": n, "radius": radius, "fraction": fraction}
     came = [f"{name} = {value!r:.100}" for name, value in given.items() if value is not None]
     if len(came) < 2:
@@ -119,19 +119,19 @@ def _radii(scene: Scene, n: int | None, radius: ArrayLike | None, fraction: floa
     assert sizes is not None
     if fraction is None:
         return sizes
-    # Relative to the first one: sums of cubes neither overflow nor vanish.
+    # Radii are relative to the first one, so that sums of cubes neither overflow nor vanish.
     sizes = sizes / sizes[0]
     part = balls_volume(scene, sizes) / (fraction * room.volume)
     return np.asarray(sizes * part ** (-1.0 / len(scene.axes())))
 
 
 def _as_many_as_fit(scene: Scene, radius: float, fraction: float, room: VolumeBox) -> Floats:
-    """As many balls of a radius as fill a fraction."""
+    """Return the radii of the largest number of balls of a radius within a fraction."""
     one = balls_volume(scene, np.array([radius])) / room.volume
     count = int(min(fraction / one, 1e15) + _CLOSE)
     if count == 0:
         raise SceneError(
-            f"fraction must be that of one ball of the radius {radius:g} m or more, {one:.4g}, got {fraction:g}; give "
+            f"fraction must be at least {one:.4g}, that of one ball of the radius {radius:g} m, got {fraction:g}; give "
             "a smaller radius, or a larger fraction"
         )
     checks.particles_fit("radius", count)
@@ -139,14 +139,14 @@ def _as_many_as_fit(scene: Scene, radius: float, fraction: float, room: VolumeBo
 
 
 def _require_below(name: str, packing: float, axes: int, detail: str) -> None:
-    """Raise a `SceneError` for more than what is grown."""
+    """Raise a `SceneError` for a packing above the largest one that is grown."""
     if packing > _MOST[axes] * (1.0 + _CLOSE):
         why = next((f"; {why} more than {most:.4g}" for most, why in _LIMITS[axes] if packing > most), "")
         raise SceneError(f"{name} must be at most {_MOST[axes]:g}, got {packing:.4g}{detail}{why}")
 
 
 def _places(scene: Scene, radius: Floats, room: VolumeBox, random: np.random.Generator) -> Floats:
-    """Places of balls that have grown to these radii."""
+    """Return places (3, N) [m] of balls that have grown to these radii."""
     axes = len(scene.axes())
     packing = balls_volume(scene, radius) / room.volume
     scale = min(1.0, (_BEGIN[axes] / packing) ** (1.0 / axes))
@@ -155,7 +155,7 @@ def _places(scene: Scene, radius: Floats, room: VolumeBox, random: np.random.Gen
             places = place_balls(scene, scale * radius, room, random, radius)
             break
         except SceneError:
-            # Within the walls of large balls there is less room.
+            # Within the walls that final radii meet there is less room.
             scale *= _LESS
     else:
         raise SceneError(
@@ -172,13 +172,13 @@ def _places(scene: Scene, radius: Floats, room: VolumeBox, random: np.random.Gen
 
 
 def _at_rest(scene: Scene) -> Scene:
-    """The scene without gravity, with walls that are smooth and stay as they are at 0 s."""
+    """The scene without gravity, with smooth walls that stay where they are at 0 s."""
     surfaces = []
     for i, one in enumerate(scene.surfaces):
         for piece in one.surfaces():
             if piece.motion is not None and not _stays(piece):
                 raise SceneError(
-                    f"surfaces[{i}].motion must leave the wall at 0 s where it is given, got {piece.motion!r:.200}; "
+                    f"surfaces[{i}].motion must leave the wall at its given place at 0 s, got {piece.motion!r:.200}; "
                     "pack a scene without the motion, with the wall where it is then"
                 )
         if one.is_there(0.0):
@@ -187,7 +187,7 @@ def _at_rest(scene: Scene) -> Scene:
 
 
 def _smooth(surface: Surface) -> Surface:
-    """A surface as a wall without laws that stays, and so its parts."""
+    """A surface, and its parts, as walls without laws or motion."""
     parts: dict[str, Any] = {}
     if surface.parts:
         parts["parts"] = tuple(replace(_smooth(part), present=part.present) for part in surface.parts)
@@ -198,6 +198,6 @@ def _smooth(surface: Surface) -> Surface:
 
 
 def _stays(surface: Surface) -> bool:
-    """Whether a surface that moves is at 0 s where it is given."""
+    """Whether a moving surface is at its given place at 0 s."""
     found = pose(surface.motion, 0.0)
     return bool(np.array_equal(found.turn, np.eye(3)) and not np.any(found.position()))

@@ -1,4 +1,4 @@
-"""The run of particles and walls that react: all depend on all others."""
+"""The run of particles and reacting walls, in which all depend on one another."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -31,12 +31,12 @@ from .reacting.described import bring_walls, freedoms_of, scenery_of, walls_now
 from .reacting.freedoms import TOO_LONG, TOO_SHORT
 from .reacting.queue import CLOCK, NOW, TAKEN, Queue, ReactionRule, SceneWalls
 
-# Of a clock, how many events were taken where no lease is made yet: so much less for each particle that is predicted.
+# The entry TAKEN of a clock before leases are made; it falls by 1 for each particle that is predicted.
 _ALL_AHEAD = -1.0
 
 
 class ReactingRun(BaseRun):
-    """The run of particles and walls that react; the arrays of the particles become a part of its state."""
+    """The run of particles and reacting walls; the arrays of the particles become a part of its state."""
 
     _observed: Observed
 
@@ -77,7 +77,7 @@ class ReactingRun(BaseRun):
         self._choose_tier()
 
     def _scenery_of(self, compiled: CompiledScene, moment: float) -> SceneWalls:
-        """The walls in the frame that ends at a moment [s], with random numbers where they send particles off."""
+        """The walls in the frame that ends at a moment [s], with random numbers if laws send particles off."""
         found = scenery_of(compiled, moment)
         return found._replace(source=self._source) if any(laws.send_off for laws in found.each_laws()) else found
 
@@ -106,7 +106,7 @@ class ReactingRun(BaseRun):
         return status, particle
 
     def _arrive(self, rule: ReactionRule, page: ThreadLog | None) -> None:
-        """Bring all particles to the end of the frame; those with rows in one log in one thread."""
+        """Bring all particles to the end of the frame, in one thread if there is a log."""
         last, first = len(self.state.mass), 0
         if page is None:
             self._in_parts(events.arrive, self._scenery, self._queue, rule, last=last)
@@ -115,12 +115,12 @@ class ReactingRun(BaseRun):
             page.turn()
 
     def _with_log(self, page: ThreadLog | None) -> Queue:
-        """The queue, with the log that is filled now."""
+        """The queue, with the log to be filled."""
         queue = self._queue
         return queue if page is None else queue._replace(watchers=page.watched_by(queue.watchers))
 
     def _take(self, rule: ReactionRule, page: ThreadLog | None, latest: float) -> tuple[int, int]:
-        """Predict where leases have ended, and take events, to the end of the frame or a halt: (status, particle)."""
+        """Make predictions and take events until the end of the frame or a halt; return the status and the particle."""
         leases = 0
         while self._predict(rule, latest) and leases < self._watch.passes[0]:
             leases += 1
@@ -136,9 +136,9 @@ class ReactingRun(BaseRun):
         return int(Status.INTERRUPTED), 0
 
     def _predict(self, rule: ReactionRule, latest: float) -> bool:
-        """New leases where some have ended, and the next event of every particle; False where a halt came between.
+        """Renew ended leases and find the next event of every particle; return False if a halt interrupts this.
 
-        The clock keeps how many are done: what is left is done when the frame goes on.
+        The clock keeps the number of particles done, so that the rest is done when the frame goes on.
         """
         n, size = len(self.state.mass), self._at_once()
         while self._clock[TAKEN] < 0.0:
@@ -153,7 +153,7 @@ class ReactingRun(BaseRun):
         return True
 
     def _fit_leases(self) -> None:
-        """Wider leases where they ended soon, narrower ones where they lasted long."""
+        """Widen leases that ended soon, and narrow leases that lasted long."""
         width: Any = self._freedoms.width
         a_particle = self._clock[TAKEN] / len(self.state.mass)
         if a_particle < TOO_SHORT:
@@ -168,7 +168,7 @@ class ReactingRun(BaseRun):
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         before, place = moment - span, self.state.position[:, item]
         message = failures.after(self._scene, before, item, status, place, before + self._queue.time[item])
-        return f"{message}, between walls of which some react"
+        return f"{message}, between walls, some of which react"
 
     def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:
         rule, part = ReactionRule(0.0, self._watch.passes, 0.0), (0, 0)

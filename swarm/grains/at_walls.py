@@ -1,4 +1,4 @@
-"""The contacts of balls with walls: a ball is a point at the wall that its centre meets."""
+"""The contacts of balls with walls: the centre of a ball is a point at the wall grown by the radius."""
 
 import math
 
@@ -27,10 +27,10 @@ from .vessel import met
 
 
 def rising(wall, r0, q0, move):
-    """The `Closing` of a ball at r0 and a wall over a step, where the centre moves so."""
+    """Return the `Closing` of a ball at r0 and a wall over a step with the move of the centre."""
     r1, turns = r0 + move, isinstance(wall, Posed) and wall.pose.turn is not None
     if wall.flat and not turns:
-        # The gap is linear in the place, and needs no roots of q.
+        # The gap is linear in the place, and needs no square roots of q.
         gradient = wall.gap_gradient(r0, r1)
         return Closing(-1.0 * gradient, dot(gradient, move - wall.displacement()))
     gradient = wall.resting_gradient(r0, r1)
@@ -40,7 +40,7 @@ def rising(wall, r0, q0, move):
 
 
 def step_at_wall(matter, wall, grains, touches, c, i):
-    """The step of a ball in contact c: what it meets of the wall, its move by now, and their `Closing`."""
+    """Return the surface that the ball of contact c meets, its current move in the step, and their `Closing`."""
     rows = touches.wall_rows
     own = met(wall, touches.listed, touches.spans, c, grains.place[i, col.RADIUS])
     move = vector_at(rows, c, col.COAST) + 0.5 * matter.h * vector_at(grains.speed, i, col.AFTER)
@@ -48,13 +48,13 @@ def step_at_wall(matter, wall, grains, touches, c, i):
 
 
 def velocity_at_end(wall, r1):
-    """That of a wall at a point at the end of a step."""
+    """The velocity of a wall at a point at the end of a step."""
     return wall._replace(pose=wall.end).velocity(r1) if isinstance(wall, Posed) else ZERO
 
 
 @outlined
 def gather_at_wall(matter, law, wall, grains, near, touches, given):
-    """Add the balls that are in a wall at an end of the step to its contacts; how many are new."""
+    """Add the balls that are in a wall at an end of the step to its contacts; return how many are new."""
     place, speed, half, rows = grains.place, grains.speed, 0.5 * matter.h, touches.wall_rows
     number, begin = given
     count = touches.wall_spans[1, number]
@@ -81,7 +81,7 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
                 for end in (col.BEGIN, col.END):
                     touches.spans[c, end] = near.spans[index(k), end]
             set_vector(rows, c, col.START, r0)
-            # What round-off has taken of the place, along the normal.
+            # The round-off lost from the place, along the normal.
             steep, _bend = own.gap_slope(q0, q0)
             n = own.discrete_gradient(r0, r0)
             lost = dot(n, rest_of(own, place, i))
@@ -108,7 +108,7 @@ def gather_at_wall(matter, law, wall, grains, near, touches, given):
 
 
 def _recall(law, near, rows, c, k):
-    """Begin friction and rolling with their impulses of the step before, where the contact has lasted."""
+    """Begin friction and rolling with the impulses of the step before, if the contact existed in it."""
     if law.friction is not None:
         set_vector(rows, c, col.DRAG, vector_at(near.wall_drag, k, 0) * lasting(rows[c, col.GAP]))
     if law.rolling is not None:
@@ -116,7 +116,7 @@ def _recall(law, near, rows, c, k):
 
 
 def press_at_wall(matter, law, own, grains, rows, at, share):
-    """Improve the impulse of a ball at a wall: its `Closing`, the velocity then, and the change as for pairs."""
+    """Improve the impulse of a ball at a wall; return its `Closing`, its new velocity and the relative change."""
     c, i = at
     half, v = 0.5 * matter.h, vector_at(grains.speed, i, col.AFTER)
     way = rising(own, vector_at(rows, c, col.START), rows[c, col.SIZE], vector_at(rows, c, col.COAST) + half * v)
@@ -130,7 +130,7 @@ def press_at_wall(matter, law, own, grains, rows, at, share):
 
 @outlined
 def sweep_wall(matter, law, wall, grains, touches, number, share):
-    """Improve the impulse of each ball at a wall; the largest change of one, relative to what moves there."""
+    """Improve the impulse of each ball at a wall; return the largest relative change."""
     rows, worst, begin = touches.wall_rows, 0.0, touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)

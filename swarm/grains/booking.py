@@ -1,4 +1,4 @@
-"""Sums over the contacts of a step: impulses on walls and their works, the virial, dissipated energy, and meetings."""
+"""Sums over contacts: impulses on walls and their work, the virial, dissipated energy, and collisions."""
 
 from typing import Any, NamedTuple
 
@@ -30,40 +30,40 @@ from .vessel import gives_work, met_member
 
 
 class ContactTotals(NamedTuple):
-    """The sums since the start, by the numbers of particles, and those of all."""
+    """The sums since the start, of each particle by its number, and of all together."""
 
     collisions: Array  # (N,) int64
     impacts: Array  # (N,) int64
-    impulse: Array  # (walls, N) [N s], then (walls, N) the work of walls that move [J]
+    impulse: Array  # (walls, N) [N s], then (walls, N) the work of moving walls [J]
     dissipated: Array  # (N,) [J]
     virial: Array  # (1,) [J s]
     sweeps: Array  # (1,) int64
     lagging: Array  # (1,) int64, steps in which friction, or a damper, was not solved to its tolerance
     overlap: Array  # (1,) the largest overlap since the frame before [m]
-    failed: Array  # (4,) what a step was refused for, see overlaps.py
+    failed: Array  # (4,) the failure of a refused step, see overlaps.py
     escape_time: Any = None  # (N,) [s], of a scene with openings
-    # Where walls send balls off:
+    # If walls send balls off:
     heat: Any = None  # (walls, N) [J]
-    ended: Any = None  # (N,) int64, contacts with walls that have ended, as random numbers count them
-    absorbed_time: Any = None  # (N,) [s], and the number of the wall, where a law absorbs balls
+    ended: Any = None  # (N,) int64, ended contacts with walls, the counter of the random numbers
+    absorbed_time: Any = None  # (N,) [s], with the number of the wall, where a law absorbs balls
     absorbed_wall: Any = None
 
 
 def _lost(matter, work, gap, change):
-    """The energy that the damper of a contact takes [J], by the work of its impulse times the step."""
-    # By what it did, not by what it was to do: so nothing is missing, however well the step is solved.
+    """The energy that the damper of a contact takes [J]; `work` is the work of its impulse times the step."""
+    # The impulse counts as it is, not the law of the damper, so that no energy is missing if the step is solved badly.
     force, _slope = matter.law.energy_slope(gap, gap + change)
     return -work / matter.h - force * change
 
 
-# Rows of what is read of the balls of a group: velocities at the end of the step, and all of their spins.
+# Rows that are read of the balls of a group: velocities at the end of the step, and all columns of spins.
 _SLIP, _SPINS, _READ = 0, 8, 24
-# Rows of what is booked of a contact: the part of the virial, the gap at the end, and what is lost.
+# Rows that are booked of a contact: its part of the virial, the gap at the end, and the energy lost.
 _VIRIAL, _END, _LOST, _BOOKED = 0, 1, 2, 3
 
 
 def _weigh(matter, rows, q, lane, read, booked, notes):
-    """Compute what is booked of a contact."""
+    """Compute the numbers that are booked of a contact."""
     s0, impulse = column(rows, q + col.START, lane), column(rows, q + col.IMPULSE, lane)
     move = move_in(matter, rows, q, lane, slip_in(read, _SLIP, lane))
     gap, way, lost = rows[q + col.GAP, lane], closing(s0, rows[q + col.SIZE, lane], move), 0.0
@@ -94,9 +94,9 @@ def _enter(matter, books, rows, q, lane, numbers, booked):
 
 @outlined
 def book_pairs(matter, grains, near, touches, books, notes):
-    """Book the contacts of pairs, and keep their friction for the next step; their largest overlap [m].
+    """Book the contacts of pairs, and keep their friction for the next step; return the largest overlap [m].
 
-    `notes` says whether what friction takes of each is asked for.
+    `notes` says whether the energy that friction takes from each contact is needed.
     """
     number, deepest, virial = grains.number, 0.0, 0.0
     read, booked = unwritten((_READ, LANES), np.float64), unwritten((_BOOKED, LANES), np.float64)
@@ -123,7 +123,7 @@ def book_pairs(matter, grains, near, touches, books, notes):
 
 @outlined
 def book_wall(matter, law, wall, grains, touches, books, number):
-    """Book the contacts with a wall; their largest overlap [m]."""
+    """Book the contacts with a wall; return the largest overlap [m]."""
     rows, begin, deepest = touches.wall_rows, touches.wall_spans[0, number], 0.0
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
@@ -136,7 +136,7 @@ def book_wall(matter, law, wall, grains, touches, books, number):
         books.impulse[index(number), one] += norm(impulse)
         work = dot(impulse, move)
         if gives_work(wall):
-            # What it gives is what the ball gains and the contact stores or loses.
+            # The work of the wall is the energy that the ball gains and the contact stores or loses.
             given = work + push * way.change
             give_work(books, index(number), one, given / matter.h)
             work = work - given

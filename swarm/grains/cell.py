@@ -1,4 +1,4 @@
-"""The cell that repeats, as pairs of balls know it: three lengths, each None where it does not repeat."""
+"""The periodic cell of pairs of balls: three lengths, each None along an axis that does not repeat."""
 
 from typing import Any, NamedTuple
 
@@ -17,16 +17,16 @@ class Lengths(NamedTuple):
 
 
 def _apart(length, x, y):
-    """x - y, of the nearest image of y."""
+    """Return x - y for the nearest image of y."""
     if length is None:
         return x - y
     shift = length * np.floor((x - y) / length + 0.5)
-    # The one is moved that is near the far face: there the difference to it has no round-off.
+    # The shift is applied to the place near the far face, where the difference to that face has no round-off.
     return select(shift > 0.0, (x - shift) - y, x - (y + shift))
 
 
 def nearest(lengths, r, other):
-    """The vector to a place from the nearest image of another one."""
+    """Return the vector to a place `r` from the nearest image of the place `other`."""
     if lengths is None:
         return r - other
     return Vec(_apart(lengths.x, r.x, other.x), _apart(lengths.y, r.y, other.y), _apart(lengths.z, r.z, other.z))

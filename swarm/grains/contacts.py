@@ -1,11 +1,11 @@
-"""The contacts of a step: their impulses, which depend on one another, one contact after the other to convergence.
+"""The contacts of a step. Their impulses depend on one another, and are solved one after the other to convergence.
 
 With the vector s from one centre to the other at both ends of a step, the gap g = R_i + R_j - |s| and V of
 contact/regularisation.py, the impulse on i is the composite discrete gradient of V with q = |s|^2,
     J = -h (V1 - V0)/(q1 - q0) (s0 + s1) = h V[g0, g1] (s0 + s1)/(|s0| + |s1|),
-as q is quadratic; so J.(s1 - s0)/h = -(V1 - V0), and a wall is the same with its own q and discrete gradient.
-A damper adds C (Phi1 - Phi0)/h to V[g0, g1], and the sum is no less than 0: what it takes is 0 or more, for Phi grows
-with g. Where two balls meet alone the restitution then is the same at any speed, for any exponent: see `damping_of`.
+as q is quadratic; so J.(s1 - s0)/h = -(V1 - V0). A wall has the same equation with its own q and discrete gradient.
+A damper adds C (Phi1 - Phi0)/h to V[g0, g1], and the sum is no less than 0. The energy that it takes is 0 or more, for
+Phi grows with g. The restitution of two balls alone is then the same at any speed, for any exponent: see `damping_of`.
 """
 
 import math
@@ -20,32 +20,33 @@ from .cell import nearest
 from .grain_arrays import set_vector, vector_at
 
 _TINY = 1e-300
-# No less than this part of the velocities counts as what moves at a contact: round-off of them is then 1e-10 of it, and
-# sweeps end that gain no more, `_NEARLY` of step.py.
+# The speed to which changes at a contact are relative is no less than this part of the velocities. Their round-off is
+# then 1e-10 of it, and sweeps that gain no more end (`_NEARLY` of step.py).
 _BELOW_ROUND_OFF = 2e-6
-# Where a damper acts, a change of an impulse counts so much less: what it takes is booked by what it did.
+# The weight of a change of an impulse where a damper acts: the energy that the damper takes is booked from the impulse
+# as it is, so that an error in it loses none.
 _DAMPED = 1e-6
-# The margin is so many times what the step before would have needed, and is relied on up to that part of it: round-off
-# decides nothing. It is for speed alone.
+# The margin is `_WIDER` times the one that the step before would have needed. It is relied on up to its part `_SURE`,
+# so that round-off decides nothing. It has no purpose but speed.
 _WIDER, _SURE = 8.0, 0.5
 
 
 class Losses(Record):
-    """What is lost at a contact."""
+    """The dampers and the friction at a contact."""
 
-    damping: Any  # None, or what is multiplied with the root of the mass that moves
+    damping: Any  # None, or the factor of the root of the mass that moves
     friction: Any  # None, or Coulomb's coefficient; 0 where only rolling is resisted
     rolling: Any = None  # None, or the coefficient of rolling.py
 
 
 class Matter(Record):
-    """What is the same for all balls and all steps."""
+    """The constants of all balls and all steps."""
 
     law: Any  # the regularisation
     pull: Any  # gravity, or None
     h: float  # the step [s]
     pairs: Any  # their `Losses`
-    walls: Any  # of each wall the same
+    walls: Any  # the `Losses` of each wall
     period: Any  # `Lengths`, or None
     limits: Any  # `Limits` of overlaps.py
     openings: Any  # of all walls, or None
@@ -70,7 +71,7 @@ class Matter(Record):
 
     @property
     def rolls(self):
-        """Whether any rolling is resisted: a constant for the compiler."""
+        """Whether rolling is resisted at any contact: a constant for the compiler."""
         return any(one.rolling is not None for one in (self.pairs, *self.walls))
 
 
@@ -78,9 +79,9 @@ class Matter(Record):
 
 
 def pressed(matter, damping, gap, change):
-    """The impulse at a contact with a gap that changes so in a step, 0 or more, and its derivative by the change.
+    """Return the impulse, 0 or more, of a contact with a change of the gap, and its derivative by the change.
 
-    The damping is that over the step.
+    `damping` has been divided by the step.
     """
     h = matter.h
     force, stiffness = matter.law.energy_slope(gap, gap + change)
@@ -97,38 +98,38 @@ def damper(own, rows, c):
 
 
 def weight_of(law):
-    """How much a change of an impulse counts."""
+    """The weight of a change of an impulse."""
     return 1.0 if law.damping is None else _DAMPED
 
 
 def lasting(gap):
-    """1 where a contact of this gap has been one in the step before, else 0: then what is kept of it is old."""
+    """Return 1 if a contact with this gap was one in the step before, else 0, as its kept impulses are out of date."""
     return select(gap > 0.0, 1.0, 0.0)
 
 
 def worse(off, worst):
-    """The larger one of two errors, NaN where one is."""
+    """The larger one of two errors, or NaN if one of them is NaN."""
     return select((off <= worst) | (worst != worst), worst, off)
 
 
 def improved(push, wanted, gain):
-    """A Newton step of the size of an impulse."""
+    """Return the size of an impulse after a Newton step."""
     new = push + (wanted - push) * gain
     return select(new > 0.0, new, 0.0)
 
 
 def begin_solve(pressed_first, ease):
-    """The first size of an impulse, and the gain of all Newton steps."""
+    """Return the first size of an impulse, and the gain of all Newton steps."""
     push, slope = pressed_first
     return push, 1.0 / (1.0 + select(slope > 0.0, ease * slope, 0.0))
 
 
 def scale_of(matter, push, speeds, ease):
-    """A factor: the magnitude of a change of an impulse times it is relative to what moves at the contact and falls.
+    """Return the factor that makes a change of an impulse relative to the speed at the contact.
 
-    What moves is taken as the solution begins: the size of the impulse, and `speeds`, the relative speed and the sum of
-    both speeds. The relative speed counts, so that balls that are carried along are solved as at rest, but no less than
-    the round-off of the sum.
+    This speed is that of the first impulse, of the fall in a step and of the relative velocity. `speeds` are the
+    magnitude of the relative velocity, by which balls that are carried along are solved as at rest, and the sum of the
+    magnitudes of both velocities; round-off of the latter is the lower bound.
     """
     fall = 0.0 if matter.pull is None else matter.h * size_of(matter.pull)
     relative, whole = speeds
@@ -137,13 +138,13 @@ def scale_of(matter, push, speeds, ease):
 
 
 def changed(old, new, share):
-    """The change from an impulse to the new one, and that share of it, which is made."""
+    """Return the change from an impulse to the new one, and the share of it that is made."""
     more = new - old
     return more, share * more
 
 
 def change_of(contact, k, new, share):
-    """The same of an impulse in three columns of a contact, which it changes."""
+    """Change an impulse in three columns of a contact by a share; return the whole change, and the share."""
     old = contact.vector(k)
     more, part = changed(old, new, share)
     contact.set_vector(k, old + part)
@@ -155,34 +156,32 @@ def size_of(a):
     return total(absolute(a))
 
 
-# --- Of sweeps for friction ------------------------------------------------------------------------------
+# --- Sweeps for friction ---------------------------------------------------------------------------------
 
 
 class ContactSweep(Record):
-    """One of some sweeps: its number, 0 where it goes over all contacts, the share of changes, and what is solved.
+    """A sweep for friction.
 
-    `inverse` is 1/omega of successive over-relaxation, by which friction changes omega times as much as it would alone.
-
-    Which contacts a later sweep for friction goes over is noted by their balls, `Touches.stirred`.
+    The contacts that later sweeps go over are noted by their balls, in `Touches.stirred`.
     """
 
-    number: int
-    share: float
-    solved: float
-    inverse: float
+    number: int  # 0 goes over all contacts
+    share: float  # the share of a change that is made
+    solved: float  # the change below which a contact is solved
+    inverse: float  # 1/omega of successive over-relaxation: friction changes omega times as much as without it
 
 
 def is_due(sweep, stirred, i):
-    """Whether a contact of a ball was not solved in the sweep before or in this one: else none of the ball changes."""
+    """Whether a contact of a ball was unsolved in this sweep or the one before; else none of its contacts changes."""
     return stirred[i] >= sweep.number - 1
 
 
 def stir(sweep, stirred, i, off):
-    """Note where a contact of a ball is not solved."""
+    """Note the sweep for a ball if a contact with the error `off` is not solved."""
     stirred[i] = select(off <= sweep.solved, stirred[i], sweep.number)
 
 
-# --- Of pairs --------------------------------------------------------------------------------------------
+# --- Pairs -----------------------------------------------------------------------------------------------
 
 
 class Closing(Record):
@@ -193,7 +192,7 @@ class Closing(Record):
 
 
 def closing(s0, size, move):
-    """The `Closing` of two balls at s0, of that size; their s changes by `move`."""
+    """Return the `Closing` of two balls at s0 of magnitude `size`, where s changes by `move`."""
     both = s0 + s0 + move
     risen = dot(move, both)
     q1 = size * size + risen
@@ -202,7 +201,7 @@ def closing(s0, size, move):
 
 
 def apart(matter, place, i, j):
-    """The vector from ball j to ball i, with what round-off has taken of their places."""
+    """The vector from ball j to ball i, with the round-off lost from their centres."""
     s = nearest(matter.period, vector_at(place, i, col.X), vector_at(place, j, col.X))
     return s + (vector_at(place, i, col.LOST) - vector_at(place, j, col.LOST))
 
@@ -212,12 +211,12 @@ def _note(rows, c, a, b, k):
 
 
 def move_of(matter, grains, i):
-    """The move of a ball in the step."""
+    """Return the move of a ball in the step."""
     return 0.5 * matter.h * (vector_at(grains.speed, i, col.BEFORE) + vector_at(grains.speed, i, col.AFTER))
 
 
 def foresee(matter, grains, course, i):
-    """Write the course of a ball in the step, by its velocities at both ends."""
+    """Write the course of a ball in the step, from its velocities at both ends."""
     place = grains.place
     set_vector(course, i, col.FROM, vector_at(place, i, col.X))
     set_vector(course, i, col.MOVE, move_of(matter, grains, i))
@@ -225,15 +224,15 @@ def foresee(matter, grains, course, i):
 
 
 def _course(course, i):
-    """The course of a ball, read."""
+    """Return the course of a ball: its centre, its move, its radius and 1/mass."""
     here, move = vector_at(course, i, col.FROM), vector_at(course, i, col.MOVE)
     return here, move, course[i, col.EXTENT], course[i, col.YIELDING]
 
 
 def _approach(matter, course, ball, j):
-    """The square of how near two balls are at an end of the step, at least, and R_i + R_j, by the courses of both.
+    """Return the square of the smaller distance of two balls at the ends of the step, and R_i + R_j.
 
-    That of the first one is given as it was read. What round-off has taken of places decides nothing here.
+    `ball` is the course of the first one. The round-off lost from places decides nothing here.
     """
     here, move, extent, yielding = ball
     s0 = nearest(matter.period, here, vector_at(course, j, col.FROM))
@@ -241,7 +240,7 @@ def _approach(matter, course, ball, j):
     nearest_one, reach = select(q1 < q0, q1, q0), extent + course[j, col.EXTENT]
     if matter.holds is None:
         return nearest_one, reach
-    # Where walls hold both they do not meet.
+    # Two balls that walls hold do not meet.
     return select(yielding + course[j, col.YIELDING] > 0.0, nearest_one, math.inf), reach
 
 
@@ -254,9 +253,9 @@ def _foresee_all(matter, grains, touches):
 
 @outlined
 def find_pairs(matter, near, touches):
-    """Find the pairs that are in contact at an end of the step, and those that miss one another by the margin or less.
+    """Find the pairs in contact at an end of the step, and the pairs that miss one another by the margin or less.
 
-    How many contacts are new.
+    Return how many contacts are new.
     """
     course, found, missed = touches.course, touches.found, touches.missed
     known, count, passed, margin = touches.used[0], touches.used[0], 0, touches.margin[0]
@@ -266,7 +265,7 @@ def find_pairs(matter, near, touches):
         for k in range(near.first[i], near.first[i + 1]):
             b, was_on = near.mate[index(k)], near.is_on[index(k)]
             q, reach = _approach(matter, course, ball, index(b))
-            # Without a branch, which would go either way: a row that does not count is written over.
+            # There is no branch, which no processor could predict; a row that does not count is written over.
             is_on = was_on | (q < reach * reach)
             near.is_on[index(k)] = is_on
             _note(found, index(count), a, b, k)
@@ -280,7 +279,7 @@ def find_pairs(matter, near, touches):
 
 @outlined
 def _find_missed(matter, grains, near, touches):
-    """The same among those that have missed one another by the margin or less."""
+    """Find the pairs in contact among those that missed one another by the margin or less; return how many are new."""
     course, found, missed, count = touches.course, touches.found, touches.missed, touches.used[0]
     known = count
     for m in range(touches.passed[0]):
@@ -297,16 +296,16 @@ def _find_missed(matter, grains, near, touches):
 
 
 class Travel(Record):
-    """How far balls are, at the end of a step, from where they were foreseen and listed, and how far they moved."""
+    """The largest distances of balls at the end of a step: from the place foreseen, the listed place, and the start."""
 
-    off_course: Any  # with the last step's change, at most [m]
-    from_list: Any  # their squares, at most [m^2]
-    longest: Any
+    off_course: Any  # from the place foreseen by the change of the last step [m]
+    from_list: Any  # from the place when listed, squared [m^2]
+    longest: Any  # of a move in the step, squared [m^2]
 
 
 @outlined
 def travel_of(matter, grains):
-    """The `Travel` of all balls."""
+    """Return the `Travel` of all balls."""
     place, speed, listed, half = grains.place, grains.speed, grains.listed, 0.5 * matter.h
     off, farthest, longest = 0.0, 0.0, 0.0
     for k in range(place.shape[0]):
@@ -320,9 +319,9 @@ def travel_of(matter, grains):
 
 
 def find_more_pairs(matter, grains, near, touches, off_course):
-    """Find the pairs that are in contact by what has been solved, and were not before; how many.
+    """Find the pairs that the solved impulses have brought into contact; return how many are new.
 
-    `off_course` is that of the `Travel`.
+    `off_course` is the one of the `Travel`.
     """
     # Two balls are nearer than foreseen by no more than this.
     off = 2.0 * off_course

@@ -1,4 +1,4 @@
-"""What is kept of contacts from step to step, such as their friction, carried over when lists are made anew."""
+"""The numbers kept of contacts from step to step, such as friction, carried over when lists are made anew."""
 
 from typing import Any, NamedTuple
 
@@ -8,25 +8,25 @@ from ..kernel.arrays import index
 from ..kernel.jit import Array, long_kernel, outlined
 from . import grain_arrays as col
 
-# Columns that are the other way round for the other particle: the impulses of friction and of rolling.
+# The first columns change sign for the other particle: the impulses of friction and of rolling.
 _TURNS = 6
 
 
 class Drags(NamedTuple):
-    """What acts: of pairs, by both particles, on the first one; at walls, in the order of the lists."""
+    """The kept numbers that are not 0: of pairs, with impulses on the first particle, and at walls, in list order."""
 
-    used: Array  # (2,) how many pairs there are, and how many contacts at walls
+    used: Array  # (2,) the numbers of pairs, and of contacts at walls
     one: Array  # (room,) int64
     other: Array
     drag: Array  # (room, columns)
     number: Array  # (room of walls,) int64, the particle
     wall: Array  # (room of walls,) int64
-    face: Array  # (room of walls,) int64, of a field, else 0
+    face: Array  # (room of walls,) int64, the face of a field, else 0
     wall_drag: Array
 
 
 def kept_drags(kernel: Any, world: Any) -> Drags | None:
-    """What lists keep of contacts, None where they keep nothing; `kernel` is that of the `Tier`."""
+    """Return the numbers that lists keep of contacts, or None; `kernel` is the method of the `Tier`."""
     if world.near.drag is None:
         return None
     kept = room_for(world.near)
@@ -35,7 +35,7 @@ def kept_drags(kernel: Any, world: Any) -> Drags | None:
 
 
 def room_for(near: Any) -> Drags:
-    """Room for what lists keep."""
+    """Return an empty `Drags` with the room of the lists."""
     pairs, touching = near.mate.size, near.slot.size
     one, other = np.empty((2, pairs), np.int64)
     number, wall, face = np.empty((3, touching), np.int64)
@@ -44,7 +44,7 @@ def room_for(near: Any) -> Drags:
 
 
 def set_drags(kernel: Any, world: Any, kept: Drags | None) -> None:
-    """Give what was kept to new lists."""
+    """Write the kept numbers into new lists; `kernel` is the method of the `Tier`."""
     if kept is not None:
         row = np.full(world.books.impacts.size, -1)
         row[world.grains.number] = np.arange(len(world.grains.number))
@@ -55,9 +55,9 @@ def set_drags(kernel: Any, world: Any, kept: Drags | None) -> None:
 
 @long_kernel
 def carry(numbers, near, kept, gives):
-    """Give new lists what was kept of what is listed again, or keep what acts.
+    """Write the kept numbers of contacts into new lists that have these contacts, or keep the numbers that are not 0.
 
-    `numbers` are the row of each particle, -1 of one that is gone, or the particle of each row.
+    If `gives`, `numbers` are the rows of the particles, -1 for one that has left; else the particles of the rows.
     """
     if gives:
         for m in range(kept.used[0]):
@@ -76,7 +76,7 @@ def carry(numbers, near, kept, gives):
 
 
 def _keep_pairs(number, near, kept, a):
-    """Keep what acts of the pairs of a row."""
+    """Keep the numbers of the pairs of a row that act."""
     for m in range(near.first[a], near.first[a + 1]):
         k, c = index(m), index(kept.used[0])
         if _copy(kept.drag, c, near.drag, k, 1.0):
@@ -85,7 +85,7 @@ def _keep_pairs(number, near, kept, a):
 
 
 def _keep_at_wall(number, near, kept, wall):
-    """Keep what acts at a wall."""
+    """Keep the numbers of the contacts at a wall that act."""
     for m in range(near.wall_first[index(wall)], near.wall_first[index(wall + 1)]):
         k, c = index(m), index(kept.used[1])
         if _copy(kept.wall_drag, c, near.wall_drag, k, 1.0):
@@ -96,7 +96,7 @@ def _keep_at_wall(number, near, kept, wall):
 
 @outlined
 def _copy(into, c, drag, k, sign):
-    """Copy what is kept of a contact, of the other particle where the sign is -1; whether anything is."""
+    """Copy the kept numbers of a contact, for the other particle if `sign` is -1; return whether any is not 0."""
     acts = False
     for column in range(drag.shape[1]):
         into[c, column] = drag[k, column] * (sign if column < _TURNS else 1.0)
@@ -105,12 +105,12 @@ def _copy(into, c, drag, k, sign):
 
 
 def _give_pair(row, near, kept, c):
-    """Give a pair that is listed again what was kept of it."""
+    """Write the kept numbers of a pair that is listed again into the list."""
     one, other = row[index(kept.one[c])], row[index(kept.other[c])]
     a, b = min(one, other), max(one, other)
     if a < 0:
         return
-    # One after the other: a ball has few.
+    # A linear search: a ball has few pairs.
     k, end = near.first[index(a)], near.first[index(a + 1)]
     while k < end and near.mate[index(k)] != b:
         k += 1
@@ -119,7 +119,7 @@ def _give_pair(row, near, kept, c):
 
 
 def _listed_at(near, wall, a, face):
-    """The place in the lists of a row at a wall, or at a face of one, -1 where it is not listed; rows ascend there."""
+    """The place of a row in the list of a wall, or of its face, where rows ascend; -1 if it is not listed."""
     k, end = near.wall_first[index(wall)], near.wall_first[index(wall + 1)]
     last = end
     while k < last:

@@ -1,4 +1,4 @@
-"""What contacts store at a frame, and the frame as others see it."""
+"""The energy that contacts store at a frame, and the state of the balls that observables and files read."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ from .vessel import met
 
 @long_kernel
 def store_at_walls(matter, walls, remaining, grains, near, into):
-    """Add what the contacts of each ball with walls store when so much of the frame is left to an array [J]."""
+    """Add to `into` the energy [J] that contacts of each ball with walls store with `remaining` [s] left."""
     place = grains.place
     for number, wall in enumerate(walls.at(remaining).each):
         for k in range(near.wall_first[number], near.wall_first[number + 1]):
@@ -40,7 +40,7 @@ def _stored_at_wall(matter, wall, grains, near, number):
 
 @long_kernel
 def stored(matter, walls, grains, near):
-    """The energy that all contacts store now [J], and the largest overlap [m]."""
+    """Return the energy that all contacts store now [J], and the largest overlap [m]."""
     place, total, deepest = grains.place, 0.0, 0.0
     for a in range(place.shape[0]):
         i = index(a)
@@ -57,7 +57,7 @@ def stored(matter, walls, grains, near):
 
 
 def show(grains: Any, state: Any, held: Any) -> None:
-    """Copy where balls are, and how fast, into the state, in the order of the particles; `held` is a `Held` or None."""
+    """Copy positions, velocities and spins into the state, in the particles' order; `held` is a `Held` or None."""
     number, begin = grains.number, slice(col.BEFORE, col.BEFORE + 3)
     state.position[:, number] = grains.place[:, col.X : col.X + 3].T
     state.velocity[:, number] = grains.speed[:, begin].T

@@ -1,8 +1,8 @@
-"""Openings of walls for soft balls, and balls that have left through one.
+"""Openings of walls for soft balls, and balls that have left through an opening.
 
-As for balls with `Impact` an opening has no rim: whether a wall is open to a ball is decided by the ball's foot on it
-at the start of each step, and a ball that then reaches into the wall has escaped, and stays where it is. What its
-contacts have stored is lost: with the wall, if the ball has pressed on it, and with others.
+As for balls with `Impact`, an opening has no rim: the foot of a ball on a wall at the start of each step decides
+whether the wall is open to it. A ball that then reaches into the wall has escaped, and stays where it is. The energy
+that its contacts store is lost: with the wall, if the ball has pressed on it, and with other balls.
 """
 
 import math
@@ -26,14 +26,14 @@ from .vessel import met, met_member
 
 @outlined
 def open_wall(matter, wall, numbers, grains, near):
-    """Find to which of the balls near a wall it is open in the step; `numbers` are its own, and of its first row."""
+    """Find the balls near a wall to which it is open in the step; `numbers` are those of the wall and its first row."""
     place, (number, first) = grains.place, numbers
     for k in range(near.wall_first[number], near.wall_first[number + 1]):
         c = index(k)
         i = index(near.slot[c])
         r, radius = vector_at(place, i, col.X), place[i, col.RADIUS]
         own = met(wall, near.listed, near.spans, c, radius)
-        # Its length is 1 on the wall alone.
+        # The length of the normal is 1 only on the wall.
         n = own.unit_normal(r)
         foot = r + ((radius - own.distance(r)) / norm(n)) * n
         near.wall_is_open[c] = is_open(matter.openings, first, place_on(own, foot), 0.0)
@@ -41,9 +41,9 @@ def open_wall(matter, wall, numbers, grains, near):
 
 @outlined
 def let_out(matter, wall, world, given):
-    """Let balls escape that reach into an open wall at the end of the step; how many do.
+    """Let balls that reach into an open wall at the end of the step escape; return their number.
 
-    `given` is the number of the wall, and that time [s].
+    `given` is the number of the wall, and the time of the end of the step [s].
     """
     grains, near, books, noting, (number, time) = world.grains, world.near, world.books, world.noting, given
     place, found = grains.place, 0
@@ -69,7 +69,7 @@ def let_out(matter, wall, world, given):
 
 
 def stored_with_others(matter: Any, world: Any, gone: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """What the contacts of some balls with others store, in the order of cells [J]; of two such balls half each."""
+    """The energy [J] that contacts with other balls store of each ball in `gone`, half each if both are in it."""
     near, place, found = world.near, world.grains.place, np.zeros(len(gone))
     first = near.first[: len(gone) + 1]
     one, other = np.repeat(np.arange(len(gone)), np.diff(first)), near.mate[: int(first[-1])]

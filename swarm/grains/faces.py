@@ -1,4 +1,4 @@
-"""The walls of a scene as soft balls meet them: those of fields by their faces."""
+"""The walls of a scene as soft balls meet them: a field by its faces."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +19,13 @@ class Fields:
         self._places: tuple[NDArray[np.int64], ...] | None = None
         self._known = -1.0
         self._each: tuple[Field, ...] = ()
-        # Of each field, of each member the number of its face, or of the body that it is.
+        # For each field, the number of the face, or of the body, to which each of its members belongs.
         self.faces: tuple[NDArray[np.int32], ...] = ()
         if compiled.order.fields:
             self._make(0.0)
 
     def _make(self, skin: float) -> None:
-        """Take the fields for balls that are no farther than a skin [m] from the cell that repeats."""
+        """Make the fields for balls that are no farther than a skin [m] from the periodic cell."""
         scene = self._compiled.scene
         if scene.period is not None:
             self._compiled = self._compiled.of_balls(self._largest + 2.0 * skin)
@@ -40,7 +40,7 @@ class Fields:
         self._known, self._each, self.faces = skin, tuple(made), tuple(faces)
 
     def places(self) -> tuple[NDArray[np.int64], ...]:
-        """Of each wall, of each member its number among the walls of the scene."""
+        """For each wall, the numbers of its members among the walls of the scene."""
         if self._places is None:
             self._places = self._found_places()
         return self._places
@@ -50,7 +50,7 @@ class Fields:
         members, rows = whole.numbering.members[1], len(whole.numbering.surfaces_of_rows)
         for i, face in zip(whole.order.fields, self.faces, strict=True):
             count, numbers = whole.pieces.each[i].wall_count(True), self._compiled.pieces.each[i].numbers()
-            # Images of a member count for it.
+            # Images of a member have the number of the member.
             known, own = members[first : first + count], np.repeat(numbers, len(face) // len(numbers))
             order = np.argsort(known, kind="stable")
             found.append(np.asarray(first + order[np.searchsorted(known[order], own)], np.int64))
@@ -63,14 +63,14 @@ class Fields:
         return any(pieces[i].motion is not None for i in self._compiled.order.fields)
 
     def reaches(self, skin: float) -> bool:
-        """Whether a skin is too wide for the fields that are known; then these are made anew."""
+        """Make the fields anew if a skin [m] is too wide for them; return whether it is."""
         if not self.faces or self._compiled.scene.period is None or skin <= self._known:
             return False
         self._make(skin)
         return True
 
     def walls(self, moment: float, skin: float) -> Walls:
-        """The walls in the frame, or its piece, that ends at a moment [s]."""
+        """The walls in the frame, or the piece of a frame, that ends at a moment [s]."""
         if not self.faces:
             return self._compiled.walls(moment)
         self.reaches(skin)

@@ -5,10 +5,10 @@ twist T = s x J/R turns both balls the same way, I_i (w1 - w0) = -R_i T and I_j 
 s, so that angular momentum is conserved. The slip is u = v_i - v_j - (R_i w_i + R_j w_j) x s/R across s, and with its
 mean over the step friction does the work J.u. At a wall the arm is the radius, and the wall's own velocity counts.
 
-It sticks where an impulse within mu times the normal one leaves no slip at the end of the step: a pile at rest does not
-creep. Else it slides, with that impulse against the slip at the end: against the mean one a contact that turns round
-within a step has no impulse that its neighbours can rely on, and sweeps over dense piles go round in circles. So a
-slip that turns round may gain a little in that step, which is booked as what is lost.
+A contact sticks if an impulse within mu times the normal one leaves no slip at the end of the step: a pile at rest does
+not creep. Else it slides, with mu times the normal impulse against the slip at the end. With the mean slip instead, a
+contact that reverses within a step has no impulse on which its neighbours can rely, and sweeps over dense piles go in
+cycles. So a slip that reverses may gain a little energy in that step, which is booked as a negative loss.
 """
 
 import math
@@ -26,69 +26,69 @@ from .grain_arrays import ROUNDNESS, OfWall, set_vector, vector_at
 from .heavy_walls import ease_across, is_heavy, now, react
 from .vessel import gives_work, met
 
-# The square of the length of a unit vector is this near to 1.
+# The error of the square of the length of a unit vector.
 _UNIT = 8.0 * EPSILON
 
 
 def across(a, n):
-    """What of a vector is across another one; all of it where that is 0."""
+    """The part of a vector perpendicular to n; the whole vector where n is 0."""
     size2 = square(n)
     return a - (dot(a, n) / select(size2 > 0.0, size2, 1.0)) * n
 
 
 def rubbed(drag, slip, ease, limit):
-    """The impulse of friction of no more than a limit, from the last one, the slip at the end with it, and its ease."""
+    """Return the impulse of friction, at most `limit`, from the last one, the slip at the end with it, and its ease."""
     stick = drag - slip * (1.0 / ease)
     size = math.sqrt(square(stick))
     return stick * select(size > limit, limit / select(size > 0.0, size, 1.0), 1.0)
 
 
-# --- Of pairs --------------------------------------------------------------------------------------------
+# --- Pairs -----------------------------------------------------------------------------------------------
 
 
 def arm_of(way, size, change, nearness):
     """s/R of two balls, from their `Closing`, |s0|, the change of the gap, and 1/R."""
-    # s0 + s1 is `along` times |s0| + |s1|
+    # s0 + s1 = (|s0| + |s1|) along.
     return way.along * (0.5 * (2.0 * size - change) * nearness)
 
 
-# --- Of walls --------------------------------------------------------------------------------------------
+# --- Walls -----------------------------------------------------------------------------------------------
 
 
 def _carried(wall, r0, r1):
-    """Twice the mean velocity of a wall's surface over a step, and that at its end."""
+    """Return twice the mean velocity of the surface of a wall over a step, and the velocity at its end."""
     last = velocity_at_end(wall, r1)
     return (wall.velocity(r0) if isinstance(wall, Posed) else ZERO) + last, last
 
 
 def _facing(own, way, radius, r0, move):
-    """The unit normal of a contact with a wall, and `_carried` of the wall at the contact.
+    """Return the unit normal of a contact with a wall, and the velocities `_carried` of the wall there.
 
-    The normal is 0 where a step goes from one side of a slab to the other as far: what its ends store is the same.
+    The normal is 0 where a step leads through a slab to the same depth on its other side, with the same stored energy.
     """
     n, size2 = way.along, square(way.along)
-    # At a flat wall `along` is the normal, but in a step from one side of a slab to the other.
+    # At a flat wall `along` is the unit normal, except in a step from one side of a slab to the other.
     if not (own.flat and abs(size2 - 1.0) <= _UNIT):
         n = n * (1.0 / math.sqrt(select(size2 > 0.0, size2, 1.0)))
     return n, _carried(own, r0 - radius * n, r0 + move - radius * n)
 
 
 def faced(matter, wall, grains, touches, c, i):
-    """`_facing` of a ball in contact c by now, and its move in the step."""
+    """Return the result of `_facing` for the ball of contact c, and its current move in the step."""
     own, move, way = step_at_wall(matter, wall, grains, touches, c, i)
     return *_facing(own, way, grains.place[i, col.RADIUS], vector_at(touches.wall_rows, c, col.START), move), move
 
 
 @outlined
 def rub_wall(matter, law, wall, grains, touches, number, sweep):
-    """Improve the impulse and the friction of each ball at a wall; the largest changes, as for pairs."""
+    """Improve the impulse and the friction of each ball at a wall; return the largest changes, as for pairs."""
     rows, speed, spin, half = touches.wall_rows, grains.speed, grains.spin, 0.5 * matter.h
     worst, pressed_worst = 0.0, 0.0
     begin, share = touches.wall_spans[0, number], sweep.share
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
         i = index(touches.wall_ends[c])
-        # One with a mass is moved by the contacts of other balls.
+        # The contacts of other balls also move a wall with a mass.
         if not is_heavy(wall) and not is_due(sweep, touches.stirred, i):
             continue
         radius, ease, w = grains.place[i, col.RADIUS], rows[c, col.EASE], vector_at(spin, i, col.AFTER)
@@ -125,7 +125,7 @@ def twist_wall(matter, wall, grains, touches, number):
 
 @outlined
 def book_rubbing(matter, wall, grains, near, touches, books, number):
-    """Book what friction takes of balls at a wall, what the wall gives by it, and keep it."""
+    """Book the energy that friction at a wall takes from balls, and the work of the wall; keep its impulse."""
     rows, spin, begin = touches.wall_rows, grains.spin, touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)

@@ -1,7 +1,7 @@
-"""The arrays of soft balls: of each ball a row or two, of each contact of a step one, in the order of the balls' cells.
+"""The arrays of soft balls: rows of each ball, and a row of each contact of a step, in the order of the balls' cells.
 
-A row is one line of the cache. Balls that are beside one another are so in memory, so that most contacts find theirs
-there.
+A row is one line of the cache. Balls that are neighbours in space are neighbours in memory, so that most contacts
+find their balls in the cache.
 """
 
 from typing import Any, NamedTuple
@@ -14,40 +14,41 @@ from ..kernel.lines import LANES
 from ..kernel.record import Record
 from ..kernel.vector import Vec, column, put
 
-# Columns of `Grains.place`: the centre, what round-off has taken of it, the radius, 1/mass.
+# Columns of `Grains.place`: the centre, the round-off lost from it, the radius, 1/mass.
 X, LOST, RADIUS, LIGHTNESS = 0, 3, 6, 7
-# Columns of `Grains.speed`: at the start of a step, and at its end. Of `Grains.spin` also the radius again, and what
-# turns the ball, m R/I: what friction reads of a ball is then in two lines.
+# Columns of `Grains.speed`: the velocity at the start of a step, and at its end. `Grains.spin` also has the radius
+# again, and the lever m R/I that turns the ball: friction then reads only two lines of a ball.
 BEFORE, AFTER, ARM, LEVER = 0, 3, 6, 7
-# Columns of `Grains.change`: that of the velocity in the last step, with which the next one begins to solve, and that
-# by the impulses of pairs in this one.
+# Columns of `Grains.change`: the change of the velocity in the last step, with which the next step begins to solve,
+# and its change by the impulses of pairs in this step.
 LAST, GIVEN = 0, 4
-# All of these are of a line of the cache.
+# A row of each of these arrays fills a line of the cache.
 COLUMNS_OF_BALLS = 8
-# Columns of a contact: s0, from one centre to the other at the start of a step, or the centre; |s0|, or the inner
-# function of the wall; the gap; the size of the impulse, and the impulse; h/2 times the velocity at the start; the
-# damping; the gain of a Newton step; what makes its changes relative ones; and of both balls of a pair 1/m. A sweep
-# without friction reads no more.
+# Columns of a contact: s0, from one centre to the other at the start of a step, at a wall the centre; |s0|, at a wall
+# its inner function; the gap; the size of the impulse, and the impulse; h/2 times the velocity at the start; the
+# damping; the gain of a Newton step; the factor that makes changes relative; 1/m of both balls of a pair. A sweep
+# without friction reads no other columns.
 START, SIZE, GAP, PUSH, IMPULSE, COAST, DAMPING, GAIN, SCALE, EASES = 0, 3, 4, 5, 6, 9, 12, 13, 14, 15
 COLUMNS_SWEPT = 17
-# The inverse of the mass that moves, the impulse of friction, and of a pair 1/(R_i + R_j) and what turns both balls.
+# The inverse of the mass that moves, the impulse of friction, and for a pair 1/(R_i + R_j) and the levers of both.
 EASE, DRAG, NEARNESS, LEVERS, COLUMNS_RUBBED = 17, 18, 21, 22, 24
-# Of a wall the place in the lists, the angular impulse of the resistance to rolling, and what both take.
+# The place in the lists, for a wall; the angular impulse of the resistance to rolling; the energy that friction and
+# this resistance take.
 LISTED, ROLL, RUBBED, COLUMNS = 24, 25, 28, 29
 # Columns of `Touches.found`, and rows of a group in `Tile.ends`: both balls, and the place in the lists.
 ONE, OTHER, PLACE, FOUND, ENDS = 0, 1, 2, 3, 3
-# Columns of `Touches.course`: the centre at the start of a step, the radius, the move in the step, and 1/mass: what is
-# asked of every pair that is listed is then in one line.
+# Columns of `Touches.course`: the centre at the start of a step, the radius, the move in the step, and 1/mass. The test
+# of every listed pair then reads one line of a ball.
 FROM, EXTENT, MOVE, YIELDING = 0, 3, 4, 7
-# Columns of `Neighbours.drag`: where the angular impulse of the resistance to rolling is kept; and in a run with a log
-# of contacts when each has begun, the sum of its normal impulses, the largest force, what friction has taken, and the
-# velocity, of a pair that of the particle with the smaller number, and the slip at its start.
+# Columns of `Neighbours.drag` after the impulse of friction: the angular impulse of the resistance to rolling. In a run
+# with a log of contacts also: the time at which the contact began, the sum of its normal impulses, the largest force,
+# the energy that friction has taken, and the velocity (of the smaller number in a pair) and the slip at the start.
 KEPT_ROLL = 3
 BEGAN, PRESSED, FORCE, TAKEN_OFF, ARRIVED, SLIP, KEPT = 6, 7, 8, 9, 10, 13, 16
-# Columns of `Neighbours.spans`: where those of a field begin in `listed` and end, and of which face they are.
+# Columns of `Neighbours.spans`: where the members of a field begin in `listed`, where they end, and their face.
 BEGIN, END, FACE = 0, 1, 2
-# Of a clock: the steps of the frame that are done, those since pairs were listed, and those since the run was halted
-# last; the skin of the lists [m].
+# Entries of a clock: the steps done of the frame, the steps since pairs were listed, the steps since the run was last
+# halted, and the skin of the lists [m].
 DONE, SINCE, TAKEN, SKIN, CLOCK = 0, 1, 2, 3, 4
 
 
@@ -56,39 +57,39 @@ ROUNDNESS = 2.5
 
 
 class Grains(NamedTuple):
-    """Each ball, in the order of cells."""
+    """The rows of the balls, in the order of cells."""
 
-    number: Array  # (N,) that of its particle
+    number: Array  # (N,) the number of the particle
     place: Array  # (N, 8)
     speed: Array  # (N, 8)
-    listed: Array  # (N, 4) where it was when pairs were listed
-    change: Array  # (N, 8) of its velocity
-    spin: Any  # (N, 8) angular velocities, as `speed`; None where there is no friction
+    listed: Array  # (N, 4) the centre when pairs were listed
+    change: Array  # (N, 8) changes of the velocity
+    spin: Any  # (N, 8) angular velocities, with the columns of `speed`; None where there is no friction
 
 
 class Neighbours(NamedTuple):
-    """What is near: of each ball those after it, of each wall the balls."""
+    """The lists of neighbours: for each ball the balls after it, for each wall the balls near it."""
 
     first: Array  # (N + 1,) where the pairs of each ball begin
     mate: Array  # (room,) int32, the other ball of each pair
-    is_on: Array  # (room,) bool, whether it is among the contacts of this step
+    is_on: Array  # (room,) bool, whether the pair is among the contacts of this step
     wall_first: Array  # (walls + 1,)
     slot: Array  # (room of walls,) int32
     wall_is_on: Array
     drag: (
-        Any  # (room, 3) the impulse of friction of each pair in the last step, with that of rolling (room, 6), or None
+        Any  # (room, 3) the impulse of friction of each pair in the last step, or None; (room, 6) with that of rolling
     )
     wall_drag: Any
-    # Of a scene with fields, else None
-    spans: Any = None  # (room of walls, 3) int32, what of a field is near
-    listed: Any = None  # (room of members,) int32, its members
-    used: Any = None  # (1,) how many of these there are, listed or not
-    # Of a scene with openings, else None
+    # In a scene with fields, else None
+    spans: Any = None  # (room of walls, 3) int32, which entries of `listed` are near the ball
+    listed: Any = None  # (room of members,) int32, the numbers of members
+    used: Any = None  # (1,) the number of members near balls, also beyond the room
+    # In a scene with openings, else None
     wall_is_open: Any = None  # (room of walls,) bool, whether the wall is open to the ball
 
 
 class Tile(NamedTuple):
-    """The contacts of pairs in groups, a row of each group for each column."""
+    """The contacts of pairs in groups; each group has a row for each column of a contact."""
 
     rows: Array  # (groups * COLUMNS, LANES)
     ends: Array  # (groups * ENDS, LANES) int32
@@ -98,24 +99,24 @@ with_lanes = spaced(LANES)
 
 
 class Touches(NamedTuple):
-    """The contacts of a step: of pairs, and of walls."""
+    """The contacts of a step, of pairs and at walls."""
 
-    tile: Tile  # those of pairs
+    tile: Tile  # the contacts of pairs
     lanes: Array  # (groups,) int64, how many contacts each group has
     splits: Array  # (groups,) int64, the lanes, as bits, where a part begins: no ball is twice in a part of a group
-    marks: Array  # (N,) int64, of each ball the last part that it is in
+    marks: Array  # (N,) int64, the last part that each ball is in
     course: Array  # (N, 8)
-    stirred: Array  # (N,) int32, of each ball the last sweep for friction in which one of its contacts was not solved
-    used: Array  # (2,) how many contacts of pairs there are, and how many groups
+    stirred: Array  # (N,) int32, the last sweep for friction in which a contact of each ball was not solved
+    used: Array  # (2,) the numbers of contacts of pairs, and of groups
     found: Array  # (room + 1, FOUND) int32, the contacts of pairs as they were found
     missed: Array  # (room + 1, FOUND) int32, the pairs that have missed one another by no more than the margin
-    passed: Array  # (1,) how many of these there are
+    passed: Array  # (1,) the number of these pairs
     margin: Array  # (1,) [m]
     wall_rows: Array  # (room of walls, COLUMNS)
     wall_ends: Array  # (room of walls,) int32, the ball
-    wall_spans: Array  # (2, walls) where those of each wall begin in `wall_rows`, and how many there are
-    spans: Any = None  # (room of walls, 3) int32, of fields, as in `Neighbours`; and the same members
-    listed: Any = None
+    wall_spans: Array  # (2, walls) where the contacts of each wall begin in `wall_rows`, and their number
+    spans: Any = None  # (room of walls, 3) int32, in a scene with fields: as in `Neighbours`
+    listed: Any = None  # the array of `Neighbours`
 
 
 class OfWall(Record):
@@ -129,7 +130,7 @@ class OfWall(Record):
         return index(int(self.rows[self.c, LISTED]))
 
     def number(self, k):
-        """What is in a column."""
+        """The number in a column."""
         return self.rows[self.c, k]
 
     def vector(self, k):
@@ -142,7 +143,7 @@ class OfWall(Record):
 
 
 class OfPair(Record):
-    """A contact of a pair: the first rows of its group, of its numbers and of the balls, and its lane."""
+    """A contact of a pair: the first rows of its group, that of its numbers and that of its balls, and its lane."""
 
     rows: Any
     q: Any
@@ -155,7 +156,7 @@ class OfPair(Record):
         return index(self.ends[self.e + PLACE, self.lane])
 
     def number(self, k):
-        """What is in a column."""
+        """The number in a column."""
         return self.rows[self.q + k, self.lane]
 
     def vector(self, k):
@@ -191,12 +192,12 @@ def grains_of(position: Any, velocity: Any, radius: Any, mass: Any, spin: Any = 
 
 
 def _lines(n: int) -> Array:
-    """Rows of so many balls, each a line of the cache."""
+    """Return rows for n balls, each a line of the cache."""
     return aligned(COLUMNS_OF_BALLS * n).reshape(n, COLUMNS_OF_BALLS)
 
 
 def beside(grains: Grains, more: Grains) -> Grains:
-    """The rows of balls, and behind them those of more."""
+    """Return the rows of balls followed by the rows of more balls."""
     pairs = zip(grains, more, strict=True)
     rows: Any = (None if old is None else aligned_copy(np.concatenate([old, new])) for old, new in pairs)
     return Grains(*rows)
@@ -205,9 +206,9 @@ def beside(grains: Grains, more: Grains) -> Grains:
 def near_of(
     n: int, walls: int, pairs: int, touching: int, kept: int = 0, members: int | None = None, opens: bool = False,
 ) -> Neighbours:  # fmt: skip
-    """Room for so many pairs, for so many balls at walls, and so many members of fields, where there are any.
+    """Return empty lists for n balls, with room for `pairs`, for `touching` balls at walls and `members` of fields.
 
-    Of each contact so many numbers are kept from step to step.
+    `kept` numbers of each contact are kept from step to step.
     """
     drags = (np.zeros((pairs, kept)), np.zeros((touching, kept))) if kept else (None, None)
     made = Neighbours(
@@ -223,8 +224,8 @@ def near_of(
 
 
 def touches_of(n: int, walls: int, pairs: int, touching: int, listed: Any = None) -> Touches:
-    """Room for the contacts of so many pairs and of so many balls at walls; `Neighbours` has the members of fields."""
-    # One more for those that are found by a step that has been solved without them, and one to ask for beside the last.
+    """Return room for the contacts of `pairs` and of `touching` balls at walls; `listed` is that of `Neighbours`."""
+    # One more group for contacts that are found after a step has been solved, and one to fetch behind the last.
     groups = -(-pairs // LANES) + 2
     tile = Tile(
         aligned(groups * COLUMNS * LANES).reshape(-1, LANES), np.zeros((groups * ENDS, LANES), np.int32)

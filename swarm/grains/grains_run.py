@@ -46,13 +46,14 @@ from .passing import Passing
 from .sent_off import Sender
 from .step import MarchRule, World, march
 
-# The first skin of the lists, of the radius of the smallest ball. In a skin a ball may move by half of it.
+# The first skin of the lists, in radii of the smallest ball. A ball may move by half the skin before lists end.
 _SKIN = 0.4
-# Room in the lists: so many pairs of each ball, and balls at walls, which become so many times as many.
+# Room in the lists: pairs of each ball, contacts with walls of each ball, and the factor by which room grows.
 _PAIRS, _AT_WALLS, _MORE = 6, 1, 1.5
-# A birth that is due so little of a step later than a step begins comes with it; and later than any step.
+# The part of a step by which a birth may be due after the start of a step and still come with it; a time in steps
+# beyond any run.
 _WHOLE, _LATE = 1e-6, 1e18
-# A skin of so many radii of the largest ball is no list any more.
+# The widest skin, in radii of the largest ball: beyond it lists save nothing.
 _WIDEST = 16.0
 
 
@@ -76,7 +77,7 @@ class GrainsRun(BaseRun):
         feed = None if particles.births is None else Feed(scene, particles, seeding.seed, self._is_clear)
         balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
         openings, ends = self._matter.openings, laws.may_end
-        # What contacts store with a wall that goes is lost too.
+        # The energy that contacts store with a wall is lost when the wall becomes absent.
         loses = rubs or laws.may_dissipate or ends or scene.has_doors() or openings is not None
         loses = loses or any(one.damping is not None for one in (self._matter.pairs, *self._matter.walls))
         self.state = State(
@@ -92,7 +93,7 @@ class GrainsRun(BaseRun):
         self._walls = self._walls_of(compiled, 0.0, 0.0)
         super().__init__(compiled, method, n, 1, Tier(compile, (self._matter, self._walls), n), seeding, watched)
         self._instants = scene.instants if scene.has_doors() else None
-        # What contacts with walls stored before the instant that has come, and the length of a step [s].
+        # The energy that contacts with walls stored before the current instant [J], and the length of a step [s].
         self._stored_before: NDArray[np.float64] | None = None
         self._step, self._span = self._matter.h, 0.0
         self._counted = watched.counters
@@ -133,15 +134,15 @@ class GrainsRun(BaseRun):
         self._list()
 
     def _walls_of(self, compiled: CompiledScene, moment: float, skin: float) -> Any:
-        """The walls in the frame, or its piece, that ends at a moment [s], by the lists' skin [m]."""
+        """The walls in the frame, or the piece of a frame, that ends at a moment [s]; `skin` is the lists' skin [m]."""
         walls, heavy = self._fields.walls(moment, skin), self._heavy
         return walls if heavy is None else with_heavy(walls, compiled, heavy, self._matter.h)
 
     def _is_clear(self, place: Floats, radius: float, moment: float) -> bool:
-        """Whether a place is clear of the walls that have a mass and are there at a moment [s]."""
+        """Whether a place is clear of the walls with a mass that are present at a moment [s]."""
         if self._heavy is None:
             return True
-        # In the frame of each, where it is as it is given.
+        # The place in the frame of each wall, in which the wall is as the scene describes it.
         places = place[:, None] - motion_of(self._heavy).shift
         images, size = self._scene.pieces_of_balls(radius).images, np.array([radius])
         return all(
@@ -164,21 +165,21 @@ class GrainsRun(BaseRun):
     # --- Births --------------------------------------------------------------------------------------------
 
     def _stop(self, span: float, moment: float) -> float:
-        """Before which step of the frame of a length [steps], that ends at a moment [s], a birth is due."""
+        """The step before which a birth is due, in the frame of the length `span` [steps] that ends at a moment [s]."""
         steps = self._steps_in(span)
         if self._feed is None:
             return steps
-        # The first step that begins at it or later; what is due before this one has been looked at.
+        # The first step that begins at the birth or later, and not the current one: its births have been dealt with.
         before = self._steps_before(span, moment)
         due = math.ceil(min(self._feed.next() / self._matter.h, _LATE) - _WHOLE - before)
         return min(steps, max(float(due), float(self._clock[DONE]) + 1.0))
 
     def _steps_before(self, span: float, moment: float) -> float:
-        """The steps, of the length of now, before the frame or the piece of one."""
+        """The steps, of the present length, before the frame or the piece of a frame."""
         return self._method.span("time", moment) - span if self._instants is None else (moment - span) / self._matter.h
 
     def _feed_in(self, span: float, moment: float) -> None:
-        """Let those come that are due before the next step."""
+        """Add the balls that are due before the next step."""
         feed = self._feed
         if feed is None:
             return
@@ -206,7 +207,7 @@ class GrainsRun(BaseRun):
     # --- Lists ---------------------------------------------------------------------------------------------
 
     def _list(self, kept: Drags | None = None) -> None:
-        """List anew what is near, where all are now; with what was kept of contacts, if lists have changed since."""
+        """Make the lists of neighbours anew, with the `kept` numbers of contacts if lists have changed since."""
         clock, kernel = self._clock, self._tier.kernel
         kept = kept_drags(kernel, self._world) if kept is None else kept
         self._wrap()
@@ -226,25 +227,25 @@ class GrainsRun(BaseRun):
         clock[SINCE] = 0.0
 
     def _drop_gone(self) -> None:
-        """Take what has escaped, or was absorbed, out of the world, and lose what its contacts store."""
+        """Take balls that escaped, or were absorbed, out of the world; book the energy of their contacts as lost."""
         world = self._world
         if not (gone := self.state.gone()[world.grains.number]).any():
             return
         lost = self._stored_at(self._walls, self._left())[world.grains.number] * gone
         lost += stored_with_others(self._matter, world, gone)
         self.state.dissipated[world.grains.number] += lost
-        # There it stays.
+        # These balls stay where they are.
         energy.show(world.grains, self.state, world.held)
         stay = {name: aligned_copy(rows[~gone]) for name, rows in world.grains._asdict().items() if rows is not None}
         self._world = world._replace(grains=world.grains._replace(**stay))
         self._make_room()
 
     def _left(self) -> float:
-        """What is left of the frame, or of the piece of one, under way [s]."""
+        """The rest of the current frame, or of the current piece of a frame [s]."""
         return (self._steps_in(self._span) - float(self._clock[DONE])) * self._matter.h
 
     def _list_near(self, cells: lists.CellOrder, skin: float) -> None:
-        """List what is near, of balls and of walls, with as much room as that takes."""
+        """List pairs, and balls near walls, with as much room as needed."""
         kernel, grains, left = self._tier.kernel, self._world.grains, self._left()
         if self._fields.reaches(skin):
             self._walls = self._walls_of(self._compiled, self._moment, skin)
@@ -258,7 +259,7 @@ class GrainsRun(BaseRun):
             self._make_room(*found)
 
     def _wrap(self) -> None:
-        """Bring all into the cell that repeats."""
+        """Wrap all balls into the periodic cell."""
         grains, image = self._world.grains, self.state.image
         for axis, length in enumerate(self._scene.period or ()):
             if length is not None:
@@ -271,14 +272,14 @@ class GrainsRun(BaseRun):
                 self._image[axis, grains.number] += cells.astype(np.int64)
 
     def _room(self, n: int, pairs: int, touching: int, members: int | None) -> tuple[arrays.Neighbours, arrays.Touches]:
-        """Arrays for n balls, so many pairs, balls at walls, and members of fields near them, None without fields."""
+        """Return arrays for n balls, with room for pairs, balls at walls and members of fields, None without fields."""
         walls, matter = len(self._owners), self._matter
         kept = KEPT if self._impacts is not None else (6 if matter.rolls else 3) if matter.rubs else 0
         near = arrays.near_of(n, walls, pairs, touching, kept, members, matter.openings is not None)
         return near, arrays.touches_of(n, walls, pairs, touching, near.listed)
 
     def _make_room(self, *found: int) -> None:
-        """Room for the balls of now in lists that hold nothing: as much as there was, and more than was `found`."""
+        """Make empty lists for the present balls, with the room of the old lists, and more than the numbers `found`."""
         near, wanted = self._world.near, zip(found or (0, 0, 0), _sizes(self._world.near), strict=True)
         pairs, touching, members = (have if need <= have else int(_MORE * need) for need, have in wanted)
         number = self._world.grains.number
@@ -286,7 +287,7 @@ class GrainsRun(BaseRun):
         self._world = self._world._replace(near=near, touches=touches)
 
     def _list_again(self) -> None:
-        """List anew in a step, with a wider skin where the lists do not even hold for one."""
+        """Make the lists anew, with a wider skin if they did not hold for a single step."""
         if self._clock[SINCE] == 0.0:
             self._clock[SKIN] *= 2.0
             largest = self.state.balls.radius.max()  # type: ignore[union-attr]
@@ -301,27 +302,27 @@ class GrainsRun(BaseRun):
             return
         if (came := comers(self._scene, instant)).any():
             seen, deepest = self._observed, OUTSIDE * self._scene.finite_size()
-            # With the walls that have a mass where they are.
+            # The scene with the walls with a mass at their present places.
             scene = self._scene if seen is None else self._scene.placed(seen.position, seen.orientation)
             require_free(scene, self._seen_state(), came, deepest, instant, self._first)
         self._stored_before = self._stored_at(self._walls_of(self._compiled, instant, float(self._clock[SKIN])), 0.0)
 
     def _stored_at(self, walls: Any, remaining: float) -> NDArray[np.float64]:
-        """What the contacts of each ball with walls store when so much of the frame is left [s], (N,) [J]."""
+        """The energy that contacts of each ball with walls store with `remaining` [s] of the frame left, (N,) [J]."""
         world, found = self._world, np.zeros(len(self.state.mass))
         kernel = self._tier.kernel(energy.store_at_walls)
         kernel(self._matter, walls, remaining, world.grains, world.near, found)
         return found
 
     def _length(self, duration: float) -> float:
-        # Each piece has steps of its own.
+        # Each piece has its own length of a step.
         return duration
 
     def _clock_time(self, moment: float) -> float:
         return super()._clock_time(moment) if self._instants is None else moment
 
     def _pages(self) -> Any:
-        """In which cells the lists were made, as the log of contacts has it."""
+        """The cells in which the balls were when the lists were made, for the log of contacts."""
         return None if self._impacts is None or self.state.image is None else self._image
 
     # --- A frame -------------------------------------------------------------------------------------------
@@ -332,7 +333,7 @@ class GrainsRun(BaseRun):
     def _prepare(self, span: float, moment: float) -> None:
         self._span = span
         if self._instants is not None:
-            # Steps of equal lengths, so that the last one ends at the instant.
+            # Steps have equal lengths, so that the last one ends at the instant.
             openings = self._compiled.openings(moment)
             self._matter = self._matter._replace(h=span / self._steps_in(span), openings=openings)
             self.state = self.state._replace(openings=openings)
@@ -341,19 +342,19 @@ class GrainsRun(BaseRun):
             self._clock[DONE] = 0.0
         if self._instants is not None:
             if self._stored_before is not None:
-                # What contacts stored with walls that went at the instant is lost.
+                # The energy that contacts stored with walls is lost when these become absent.
                 self._list()
                 self.state.dissipated[:] += self._stored_before - self._stored_at(self._walls, span)
                 self._stored_before = None
             if not self._cut_short and self._fields.any_moves():
-                # How long ago they were listed is known in steps.
+                # The age of the lists is counted in steps, and the length of a step may change here.
                 self._list()
         if not self._cut_short and self._done[0] == 0:
             self._world.books.overlap[0] = 0.0
         self._clock[TAKEN] = 0.0
 
     def _steps_in(self, span: float) -> float:
-        """The steps of a frame, or of a piece of one; its span is in the unit of `advance`."""
+        """The steps of a frame, or of a piece of a frame; `span` is in the unit of `advance`."""
         return span if self._instants is None else steps_within(span, self._step)
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
@@ -371,22 +372,22 @@ class GrainsRun(BaseRun):
         if page is not None:
             page.close()
         if status == Status.DONE:
-            # Those at the end of the frame.
+            # The births at the end of the frame.
             self._feed_in(span, moment)
         return status, 0
 
     def _watched_world(self, log: Log | None) -> World:
-        """The world with the counts of members, of which another is of a run that goes on, and a log of contacts."""
+        """The world with a log of contacts and with the counts of members of the calling thread."""
         world, tally = self._world, self._tally
         noting = None if log is None else Noting(log, self.state.period, self._pages())
         world = world._replace(noting=noting, counts=None if tally is None else tally.counts())
         if all(one is None for one in (world.sender, world.noting, world.counts)):
             return world
-        # Members are others where the skin has become wider than the images of a cell.
+        # The members change when the skin becomes wider than the images of a cell.
         return world._replace(places=self._fields.places())
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
-        # Of the step.
+        # The start of the step that failed.
         moment -= (self._steps_in(span) - self._clock[DONE]) * self._matter.h
         if status == Status.UNSOLVED:
             return refused.unsolved(moment, self._matter.h)
@@ -419,7 +420,7 @@ class GrainsRun(BaseRun):
             if length is not None and image is not None:
                 cells = np.floor(position[axis] / length)
                 position[axis] -= cells * length
-                # Below 0 by so little that it is at the other face.
+                # A place just below 0 is rounded to the other face.
                 at_face = position[axis] >= length
                 position[axis, at_face] = 0.0
                 image[axis] = self._image[axis] + cells.astype(np.int64) + at_face
@@ -427,7 +428,7 @@ class GrainsRun(BaseRun):
     def _observe(self, moment: float) -> None:
         world, walls = self._world, self._walls
         stored, overlap = self._tier.kernel(energy.stored)(self._matter, walls, world.grains, world.near)
-        # At the start, where no step was before.
+        # At the start no step has set the largest overlap.
         self._stored, world.books.overlap[0] = stored, max(overlap, world.books.overlap[0])
         super()._observe(moment)
 
@@ -447,7 +448,7 @@ class GrainsRun(BaseRun):
         }  # fmt: skip
 
     def _scale_of(self, seen: dict[str, Any]) -> float:
-        """The larger one of now and of the start: kinetic and contact energy, and what weight may make of them."""
+        """The largest sum so far of kinetic and contact energy, and of the energy that weight may add."""
         pull = 0.0 if self._scene.gravity is None else math.hypot(*self._scene.gravity)
         mass, walls, own = float(self._seen_state().mass.sum()), self._observed, 0.0
         if walls is not None and self._heavy is not None:
@@ -467,7 +468,7 @@ class GrainsRun(BaseRun):
             "crossed": state.crossed, "walls": self._heavy,
         }  # fmt: skip
         if state.escape_time is not None or state.absorbed_time is not None:
-            # Where those are that are gone, and how fast.
+            # The places and velocities of balls that have left.
             kept |= {"position": state.position, "velocity": state.velocity, "spin": state.spin}
         return kept
 
@@ -486,5 +487,5 @@ class GrainsRun(BaseRun):
 
 
 def _sizes(near: arrays.Neighbours) -> tuple[int, int, int]:
-    """The room for pairs, for balls at walls, and for members of fields."""
+    """Return the room for pairs, for balls at walls, and for members of fields."""
     return near.mate.size, near.slot.size, 0 if near.listed is None else near.listed.size

@@ -1,9 +1,10 @@
-"""Walls with a mass, which contacts of soft balls push: each is one more unknown of a step.
+"""Walls with a mass, which contacts of soft balls push: each wall is one more unknown of a step.
 
-A wall of the mass M goes from the displacement D0 to D1 = D0 + h (V0 + V1)/2, as a ball does. The impulse J of each
-contact on a ball is -J on the wall, along the axis if that is on a guide, with the spring k. With its weight M a
+A wall of the mass M goes from the displacement D0 to D1 = D0 + h (V0 + V1)/2, as a ball does. A contact with the
+impulse J on a ball has the impulse -J on the wall. On a guide, only the parts of J and of the weight M a along the axis
+act. With the spring k of the guide,
     M (V1 - V0) = h (M a - k (D0 + D1)/2) - sum J,
-where the force of the spring is the discrete gradient of k D^2/2: so momentum and energy are kept with the wall's.
+where the force of the spring is the discrete gradient of k D^2/2, so that momentum and energy are conserved.
 Solved for V1, with c = h^2 k/(4 M):
     V1 = ((1 - c) V0 + h (a - k/M D0))/(1 + c) - sum J/(M (1 + c)).
 """
@@ -30,48 +31,48 @@ from .grain_arrays import Grains, grains_of, set_vector, vector_at
 
 
 class FreeMotion(Record):
-    """How a wall with a mass moves, with the rows of `Grains` that say where it is and how fast."""
+    """The motion of a wall with a mass, with the rows of `Grains` that have its displacement and its velocity."""
 
     row: int
     lightness: float  # 1/(M (1 + c))
     axis: Any  # of the guide, or None
     spring: Any  # k/M of its spring [1/s^2], or None
-    pull: Any  # its acceleration by gravity, along the axis if there is one, or None
+    pull: Any  # its acceleration by gravity, along the axis of a guide, or None
     h: float  # the step [s]
     place: Array
     speed: Array
 
-    # It does not turn.
+    # The wall does not turn.
     turn, spin, late = None, None, 0.0
 
     @property
     def center(self):
-        """That of no rotation."""
+        """The centre of rotation, of no effect here."""
         return ZERO
 
     def at_start(self):
-        """Its pose at the start of the step."""
+        """The pose of the wall at the start of the step."""
         k = index(self.row)
         return PoseDerivatives(vector_at(self.place, k, col.X), vector_at(self.speed, k, col.BEFORE), ZERO, None)
 
     def at_end(self):
-        """Its pose at the end of the step, by the impulses of now."""
+        """The pose of the wall at the end of the step, by the current impulses."""
         k = index(self.row)
         return PoseDerivatives(
             vector_at(self.place, k, col.X) + self.move(), vector_at(self.speed, k, col.AFTER), ZERO, None
         )
 
     def move(self):
-        """Its displacement in the step."""
+        """The displacement of the wall in the step."""
         k = index(self.row)
         return 0.5 * self.h * (vector_at(self.speed, k, col.BEFORE) + vector_at(self.speed, k, col.AFTER))
 
     def lost(self):
-        """What round-off has taken of its displacement."""
+        """The round-off lost from the displacement of the wall."""
         return vector_at(self.place, index(self.row), col.LOST)
 
     def free_velocity(self):
-        """Its velocity at the end of a step without contacts."""
+        """The velocity of the wall at the end of a step without contacts."""
         k = index(self.row)
         v, h = vector_at(self.speed, k, col.BEFORE), self.h
         gained = ZERO if self.pull is None else h * self.pull
@@ -81,13 +82,13 @@ class FreeMotion(Record):
         return ((1.0 - c) * v + (gained - (h * self.spring) * vector_at(self.place, k, col.X))) / (1.0 + c)
 
     def push(self, impulse):
-        """Add an impulse to its velocity at the end of the step."""
+        """Add an impulse to the velocity of the wall at the end of the step."""
         k = index(self.row)
         change = impulse if self.axis is None else dot(impulse, self.axis) * self.axis
         set_vector(self.speed, k, col.AFTER, vector_at(self.speed, k, col.AFTER) + self.lightness * change)
 
     def eases(self, n):
-        """What a unit impulse along a normal gives it along that, and the most that one across does across."""
+        """The change of velocity along n by a unit impulse along n, and the largest one across n by one across n."""
         if self.axis is None:
             return self.lightness, self.lightness
         along, size2 = dot(n, self.axis), square(n)
@@ -96,26 +97,26 @@ class FreeMotion(Record):
 
 
 class HeavyWall(Posed):
-    """A wall with a mass over a step; its `drive` is a `FreeMotion`; grown it is where impulses have brought it."""
+    """A wall with a mass over a step; its `drive` is a `FreeMotion`, and `grown` places it by the current impulses."""
 
     def grown(self, radius):
-        """What the centre of a ball meets of it now."""
+        """The surface that the centre of a ball meets, by the current impulses."""
         return self.now()._replace(body=self.body.grown(radius))
 
     def now(self):
-        """The wall by the impulses of now."""
+        """The wall by the current impulses."""
         return self._replace(pose=self.drive.at_start(), end=self.drive.at_end())
 
     def displacement(self):
-        """That of the step: not the difference of two places, which has their round-off."""
+        """The displacement in the step, not as the difference of two places, which has their round-off."""
         return self.drive.move()
 
 
 class HeavyMoving(Moving):
-    """A wall with a mass, or a field of them; its `drive` is its `FreeMotion`."""
+    """A wall, or a field of walls, with a mass; its `drive` is a `FreeMotion`."""
 
     def during(self, remaining, after):
-        """The wall over the step; it keeps no time."""
+        """The wall over the step, whatever the time."""
         return HeavyWall(self.body, self.drive.at_start(), self.drive.at_end(), self.drive, remaining, after)
 
 
@@ -128,27 +129,27 @@ def is_heavy(wall):
     return isinstance(_own(wall), HeavyWall)
 
 
-# --- Of one contact; `own` is what the ball meets --------------------------------------------------------
+# --- One contact; `own` is the surface that the ball meets -----------------------------------------------
 
 
 def now(own):
-    """A wall by the impulses of now."""
+    """A wall by the current impulses."""
     return own.now() if isinstance(own, HeavyWall) else own
 
 
 def rest_of(own, place, i):
-    """What round-off has taken of the place of a ball against the wall."""
+    """The round-off lost from the place of a ball relative to the wall."""
     lost = vector_at(place, i, col.LOST)
     return lost - own.drive.lost() if isinstance(own, HeavyWall) else lost
 
 
 def place_on(own, r):
-    """A point as the openings of a wall are given: they move with one that has a mass."""
+    """A point in the frame in which the openings of a wall are given: they move with a wall with a mass."""
     return own.own_place(r) if isinstance(own, HeavyWall) else r
 
 
 def note_eases(own, rows, c, n):
-    """Note what the wall yields to impulses along and across the normal."""
+    """Write how a wall with a mass yields to impulses along and across the normal."""
     if isinstance(own, HeavyWall):
         rows[c, col.EASES], rows[c, col.EASES + 1] = own.drive.eases(n)
 
@@ -159,7 +160,7 @@ def ease_along(own, rows, c):
 
 
 def ease_across(own, rows, c, ease):
-    """The same across the normal, from that of the ball."""
+    """The inverse of the mass that moves across the normal, from that of the ball, `ease`."""
     return ease + rows[c, col.EASES + 1] if isinstance(own, HeavyWall) else ease
 
 
@@ -169,12 +170,12 @@ def react(own, impulse):
         own.drive.push(-1.0 * impulse)
 
 
-# --- Of a step -------------------------------------------------------------------------------------------
+# --- A step ----------------------------------------------------------------------------------------------
 
 
 @outlined
 def begin_walls(heavy, h):
-    """The velocities at the end of a step with the last one's change; the square of how far any is then from lists."""
+    """Set the end velocities from the last changes; return the largest squared distance from the listed places."""
     place, speed, farthest = heavy.place, heavy.speed, 0.0
     for k in range(place.shape[0]):
         i = index(k)
@@ -185,7 +186,7 @@ def begin_walls(heavy, h):
 
 
 def fly_wall(wall):
-    """The velocity of a wall with a mass at the end of a step without contacts."""
+    """Set the velocity of a wall with a mass at the end of the step to that of a step without contacts."""
     drive = _own(wall).drive
     set_vector(drive.speed, index(drive.row), col.AFTER, drive.free_velocity())
 
@@ -206,7 +207,7 @@ def push_back(law, wall, touches, number):
 
 
 def heavy_rows(scene: Scene) -> Grains | None:
-    """The rows of the surfaces with a mass at the start, in their order; None in a scene without them."""
+    """Return the rows of the surfaces with a mass at the start, in their order; None in a scene without them."""
     heavy = [(i, one) for i, one in enumerate(scene.surfaces) if one.reacts()]
     if not heavy:
         return None
@@ -217,19 +218,19 @@ def heavy_rows(scene: Scene) -> Grains | None:
 
 
 class WallMotion(NamedTuple):
-    """Where walls with a mass are, and how fast, as `observed_of` takes it."""
+    """The displacements and velocities of walls with a mass, as `observed_of` takes them."""
 
     shift: Floats  # (3, K) [m]
     velocity: Floats  # (3, K) [m/s]
 
 
 def motion_of(heavy: Grains) -> WallMotion:
-    """The `WallMotion` at the end of a step."""
+    """Return the `WallMotion` at the end of a step."""
     return WallMotion(heavy.place[:, col.X : col.X + 3].T, heavy.speed[:, col.BEFORE : col.BEFORE + 3].T)  # type: ignore[arg-type]
 
 
 def with_heavy(walls: Walls, compiled: CompiledScene, heavy: Grains, h: float) -> Walls:
-    """The walls of a scene, of which some have a mass, in steps of a length [s]."""
+    """Return the walls of a scene, some of which have a mass, in steps of the length h [s]."""
     scene, row = compiled.scene, {int(i): k for k, i in enumerate(heavy.number)}
     each: list[Any] = []
     for i, wall in zip(compiled.numbering.surfaces_of_rows, walls.each, strict=True):

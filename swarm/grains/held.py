@@ -1,8 +1,8 @@
-"""Balls that wait at a wall: a law of it holds them for a while where a contact has ended.
+"""Balls that wait at a wall: a law of the wall holds them for a time when a contact has ended.
 
-A ball that is held neither moves nor turns, as if its mass had no bound: what presses on it meets a fixed sphere, and
-no work is done on it. Its velocity and spin are those with which it leaves, also in files and sums meanwhile, so that
-its energy is there all the time. It leaves at the start of the first step that begins when its wait is over, or later.
+A ball that is held neither moves nor turns, as if its mass were infinite: others meet a fixed sphere, and do no work
+on it. Files and sums have the velocity and spin with which it leaves, so that its energy is counted all the time. It
+leaves at the start of the first step that begins when its wait is over, or later.
 """
 
 import math
@@ -16,27 +16,27 @@ from ..kernel.vector import ZERO, column, put
 from . import grain_arrays as col
 from .grain_arrays import set_vector, vector_at
 
-# A step that begins so little of a step earlier begins then.
+# The part of a step by which a step may begin before the end of a wait, and still counts as beginning at it.
 _WHOLE = 1e-6
 
 
 class Held(NamedTuple):
-    """Which balls are held, by the numbers of particles."""
+    """The held balls, by the numbers of particles."""
 
-    until: Array  # (N,) when each leaves [s], NaN where it is not held
-    velocity: Array  # (3, N) with which it leaves [m/s]
+    until: Array  # (N,) the time at which each ball leaves [s], NaN if it is not held
+    velocity: Array  # (3, N) the velocity with which it leaves [m/s]
     spin: Any  # (3, N) [rad/s], None where there is no friction
     mass: Array  # (N,) [kg]
 
 
 def held_of(mass: Any, rubs: bool) -> Held:
-    """No ball is held."""
+    """Return a `Held` in which no ball is held."""
     n = len(mass)
     return Held(np.full(n, math.nan), np.zeros((3, n)), np.zeros((3, n)) if rubs else None, mass)
 
 
 def velocity_of(held, grains, i):
-    """The velocity of a ball, or that with which it leaves."""
+    """The velocity of a ball, or the velocity with which it leaves if it is held."""
     one = index(grains.number[i])
     if held is not None and held.until[one] == held.until[one]:
         return column(held.velocity, 0, one)
@@ -56,7 +56,7 @@ def hold(held, grains, i, until):
 
 @outlined
 def let_go(held, grains, now, h):
-    """Let the balls go that leave before a step of a length [s] that begins now [s]."""
+    """Release the balls that have waited until the start, `now` [s], of a step of the length h [s]."""
     for k in range(grains.number.size):
         i = index(k)
         one = index(grains.number[i])

@@ -1,11 +1,10 @@
-"""The contacts of pairs in groups, each in a lane: one after the other takes three times as long.
+"""The contacts of pairs in groups, one contact a lane; one after the other they take three times as long.
 
-Contacts are cut into slices, a slice into as many parts as a group has lanes, and a group has one contact of each part:
-so its balls are far from one another, and what is read of them is in the second cache. The numbers of a group are
-beside one another, by columns, and LLVM makes vectors of them. A group is computed in three loops over its lanes: one
-reads from balls, one computes without a branch, and one writes to balls, which may be the same ones. Sweeps go over all
-groups. A group of which two contacts share a ball goes in parts: so each contact begins with what those before it have
-led to.
+Contacts are cut into slices, a slice into as many parts as a group has lanes, and a group has one contact of each part.
+So its balls are far from one another, while their rows are in the second cache. The numbers of a group are stored by
+columns, from which LLVM makes vectors. A group is computed in three loops over its lanes: one reads from balls, one
+computes without a branch, and one writes to balls, which may be the same. Sweeps go over all groups. A group in which
+two contacts share a ball is done in parts, so that each contact begins with the result of the contacts before it.
 """
 
 import math
@@ -37,24 +36,24 @@ from .grain_arrays import ROUNDNESS, OfPair, vector_at, with_lanes
 
 
 def of_group(touches, g):
-    """The rows of the contacts, the first one of a group, the rows of the balls, and the first one of the group."""
+    """The rows of the contacts and the first row of a group, the rows of the balls and the first row of the group."""
     tile = with_lanes(touches.tile)
     return tile.rows, index(g * col.COLUMNS), tile.ends, index(g * col.ENDS)
 
 
 def balls_of(ends, e, lane):
-    """The balls of a contact of the group with these rows of balls."""
+    """The balls of a contact in a lane; the rows of the balls of its group begin at e."""
     return index(ends[e, lane]), index(ends[e + 1, lane])
 
 
 def _fetch_next(rows, q, columns):
-    """Ask for so many columns of the next group: those of many balls are not in the second cache."""
+    """Fetch `columns` columns of the next group: the groups of many balls are not in the second cache."""
     for k in range(columns):
         fetch(rows, (q + col.COLUMNS + k) * LANES)
 
 
 def _fetch_ball(grains, i):
-    """Ask for what a contact begins with of a ball."""
+    """Fetch the rows of a ball with which a contact begins."""
     for rows in (grains.place, grains.speed, grains.change):
         fetch(rows, i * rows.shape[1])
     if grains.spin is not None:
@@ -62,7 +61,7 @@ def _fetch_ball(grains, i):
 
 
 def read_lines(table, ends, e, tile, k):
-    """Read all columns of both balls of each contact of a group: those of the second one are behind the others."""
+    """Read all columns of both balls of each contact of a group, the columns of the second ball last."""
     for n in (0, 1):
         first = k + n * col.COLUMNS_OF_BALLS
         into_lanes(tile, first, table, 0, ends, e + n)
@@ -70,7 +69,7 @@ def read_lines(table, ends, e, tile, k):
 
 
 def read_ends(table, ends, e, tile, k):
-    """Read what they have at the end of the step, in four columns from that on."""
+    """Read the four columns of the end of the step of both balls of each contact of a group."""
     into_lanes(tile, k, table, col.AFTER, ends, e)
     into_lanes(tile, k + FOUR, table, col.AFTER, ends, e + 1)
 
@@ -81,38 +80,38 @@ def slip_in(tile, k, lane):
 
 
 def turning_in(tile, one, other, k, lane):
-    """R_i w_i + R_j w_j; in which rows of a tile the columns of both balls begin."""
+    """R_i w_i + R_j w_j; `one` and `other` are the rows of a tile in which the columns of both balls begin."""
     turned = column(tile, one + k, lane) * tile[one + col.ARM, lane]
     return turned + column(tile, other + k, lane) * tile[other + col.ARM, lane]
 
 
 def pair_at(touches, g, lane):
-    """A contact of a group, and its balls."""
+    """Return a contact of a group, and its balls."""
     rows, q, ends, e = of_group(touches, g)
     return OfPair(rows, q, ends, e, lane), balls_of(ends, e, lane)
 
 
 def move_in(matter, rows, q, lane, difference):
-    """The change of s in a step by that of the velocities at its end."""
+    """The change of s in a step, from the difference of the velocities at its end."""
     return column(rows, q + col.COAST, lane) + 0.5 * matter.h * difference
 
 
 # --- At the start of a step ------------------------------------------------------------------------------
 
-# Rows of what the contacts of a group begin with: the lines of both balls, their places and their velocities, and what
-# turns them; then of what they give, as `give`: velocities by the impulses, and spins by the twists.
+# Rows that the contacts of a group read at the start: `place`, `speed` and the last columns of `spin` of both balls.
+# The rows that they write, as `_give` does, follow: velocities by the impulses, and spins by the twists.
 _PLACE, _SPEED, _TURNS = 0, 16, 32
 _IMPULSES, _TWISTS, _READ = 40, 48, 56
 
 
-# No slice has more groups: their rows, and the lines of their balls, are in a second cache of 1 MB. Where all are one
-# slice a step takes 1.02 to 1.1 times as long as 10 000 grains lie, on a busy machine, and as long as they fall.
+# The most groups of a slice: their rows, and those of their balls, fit into a second cache of 1 MB. With one slice for
+# all, a step takes 1.02 to 1.1 times as long while 10 000 grains lie, on a busy machine, and as long while they fall.
 _SLICE = 288
 
 
 def _lay(touches, g, lane, c):
-    """Give a contact that has been found a lane."""
-    # Nothing of its rows, which are not in the cache yet.
+    """Put a contact that has been found into a lane."""
+    # The columns of the contact are written later: they are not in the cache yet.
     _rows, _q, ends, e = of_group(touches, g)
     for k in (col.ONE, col.OTHER, col.PLACE):
         ends[e + k, lane] = touches.found[c, k]
@@ -120,15 +119,15 @@ def _lay(touches, g, lane, c):
 
 @outlined
 def _begin_group(matter, grains, near, touches, group):
-    """Begin to solve for the contacts of a group from one lane to another, with their impulses as they are foreseen.
+    """Begin to solve for the contacts of a group from one lane to another, with the impulses foreseen.
 
-    Of a whole group also lanes that have no contact.
+    In a whole group, lanes without a contact are computed too.
     """
     (g, begin, end, is_whole), spin = group, grains.spin
     lanes = lanes_between(begin, end)
     read, (rows, q, ends, e) = unwritten((_READ, LANES), np.float64), of_group(touches, g)
     for k in range(begin, end):
-        # Of the second ball in the next group, which has been laid; the first one is often that of this group.
+        # The second ball of the contact in the next group, which has been laid; its first ball is often in this group.
         _fetch_ball(grains, index(ends[e + col.ENDS + 1, index(k)]))
         if near.drag is not None:
             fetch(near.drag, ends[e + col.ENDS + col.PLACE, index(k)] * near.drag.shape[1])
@@ -193,7 +192,7 @@ def _begin_contact(matter, rows, q, lane, read):
 
 @outlined
 def group_pairs(matter, grains, near, touches, known):
-    """Put the contacts that have been found, after those which are known, into groups, and begin to solve for them."""
+    """Put the contacts that have been found, from number `known` on, into groups, and begin to solve for them."""
     count, found, marks = touches.used[0], touches.found, touches.marks
     if known == 0:
         groups, parts = (count + LANES - 1) // LANES, 0
@@ -219,7 +218,7 @@ def group_pairs(matter, grains, near, touches, known):
             _begin_group(matter, grains, near, touches, (g, 0, end, True))
         touches.used[1] = groups
     else:
-        # Few, behind the others.
+        # New contacts are few, and go behind the others.
         for k in range(known, count):
             last = touches.used[1] - 1
             if touches.lanes[index(last)] == LANES:
@@ -232,49 +231,49 @@ def group_pairs(matter, grains, near, touches, known):
             _begin_group(matter, grains, near, touches, (last, lane, lane + 1, False))
 
 
-# --- At its end ------------------------------------------------------------------------------------------
+# --- At the end of a step --------------------------------------------------------------------------------
 
 
 def lanes_between(begin, end):
-    """The lanes from one to the one before another, as bits."""
+    """The lanes from `begin` to the one before `end`, as bits."""
     return (1 << end) - (1 << begin)
 
 
-# By their bits
+# The lanes of each pattern of bits.
 _SOME_LANES = tuple(tuple(k for k in range(LANES) if (lanes >> k) & 1 == 1) for lanes in range(2**LANES))
 
 
 def over_lanes(lanes):
-    """What a loop over some lanes, as bits, goes over: in a kernel all, so that it is of whole vectors."""
+    """The range of a loop over some lanes, as bits: in a kernel all lanes, so that the loop has whole vectors."""
     return _SOME_LANES[lanes] if is_known(lanes) else range(LANES)
 
 
 def is_in(lanes, k):
-    """Whether a lane is one of some lanes, as bits."""
+    """Whether a lane is among some lanes, as bits."""
     return (lanes >> k) & 1 == 1
 
 
 def _give(given, k, lane, to_first, to_second):
-    """Note what both balls of a contact get, in eight rows, of which the fourth and the eighth are 0."""
+    """Write the changes of both balls of a contact into eight rows, of which the fourth and the eighth are 0."""
     put(given, k, lane, to_first)
     put(given, k + FOUR, lane, to_second)
     given[k + FOUR - 1, lane], given[k + 2 * FOUR - 1, lane] = 0.0, 0.0
 
 
 def give_impulse(rows, q, lane, given, k, impulse):
-    """Note what an impulse on the first ball of a contact changes of the velocities of both."""
+    """Write the changes of both velocities by an impulse on the first ball of a contact."""
     to_second = impulse * rows[q + col.EASES + 1, lane]
     _give(given, k, lane, impulse * rows[q + col.EASES, lane], -1.0 * to_second)
 
 
 def give_twist(rows, q, lane, given, k, twist):
-    """Note what a twist changes of the spins of both balls of a contact."""
+    """Write the changes of both spins of a contact by a twist."""
     _give(given, k, lane, -1.0 * (twist * rows[q + col.LEVERS, lane]), -1.0 * (twist * rows[q + col.LEVERS + 1, lane]))
 
 
 @outlined
 def push_pairs(matter, grains, touches):
-    """Sum the impulses of the pairs."""
+    """Add the impulses of all pairs to the sums of their balls."""
     given = unwritten((2 * FOUR, LANES), np.float64)
     for g in range(touches.used[1]):
         rows, q, ends, e = of_group(touches, g)
@@ -302,7 +301,7 @@ def twist_pairs(matter, grains, touches):
 
 
 def twist_in(rows, q, lane, move):
-    """s x J/R of a pair; its s changes by `move`: with all of J, so that no angular momentum is lost at all."""
+    """s x J/R of a pair, where s changes by `move`; J has both impulses, so that no angular momentum is lost."""
     s = column(rows, q + col.START, lane) + 0.5 * move
     impulse = column(rows, q + col.IMPULSE, lane) + column(rows, q + col.DRAG, lane)
     return cross(s * rows[q + col.NEARNESS, lane], impulse)
@@ -310,15 +309,15 @@ def twist_in(rows, q, lane, move):
 
 # --- Sweeps --------------------------------------------------------------------------------------------
 
-# Rows of what a group begins with: of both balls the velocities, and the spins with the radii; and of what it gives, as
-# `_give`: velocities by the change of the impulse, and spins by the twist, the largest error of the sweep in each lane,
-# the largest of normal impulses alone, and the error of the contact.
+# Rows that a group reads: the velocities of both balls, and their spins with the radii. Rows that it writes, the first
+# two as `_give` does: the velocities by the change of the impulse, the spins by the twist, the largest error of the
+# sweep in each lane, the largest error of normal impulses alone, and the error of the contact.
 _SLIP, _TURNING, _BEGUN = 0, 8, 16
 _PART, _TWIST, _WORST, _PRESSED, _OFF, _GIVEN = 0, 8, 16, 17, 18, 19
 
 
 def _press(matter, rows, q, lane, is_due, begun, share):
-    """Improve the impulse of a contact of a group, if it is due: its `Closing`, the change, and the error."""
+    """Improve the impulse of a contact of a group if it is due; return its `Closing`, its size, change and error."""
     move = move_in(matter, rows, q, lane, slip_in(begun, _SLIP, lane))
     way = closing(column(rows, q + col.START, lane), rows[q + col.SIZE, lane], move)
     damping = None if matter.pairs.damping is None else rows[q + col.DAMPING, lane]
@@ -332,12 +331,12 @@ def _press(matter, rows, q, lane, is_due, begun, share):
 
 
 def _if(is_due, change):
-    """A change that is made, or what added to any number leaves it as it is."""
+    """A change if it is due, else -0.0, which changes no number that it is added to."""
     return Vec(select(is_due, change.x, -0.0), select(is_due, change.y, -0.0), select(is_due, change.z, -0.0))
 
 
 def _rub(matter, rows, q, lane, is_due, begun, given, sweep):
-    """Improve the impulse and the friction of a contact of a group, if it is due; its error, and that of the first."""
+    """Improve impulse and friction of a contact if it is due; return the larger error, and that of the impulse."""
     way, push, part, off = _press(matter, rows, q, lane, is_due, begun, sweep.share)
     ease, over = rows[q + col.EASE, lane], 1.0 / square(way.along)
     arm = arm_of(way, rows[q + col.SIZE, lane], way.change, rows[q + col.NEARNESS, lane])
@@ -355,13 +354,13 @@ def _rub(matter, rows, q, lane, is_due, begun, given, sweep):
 
 
 def _note_worst(given, k, lane, is_due, off):
-    """Note the error of a contact, if it is due, in its lane."""
+    """Keep the error of a contact in its lane if it is due and the largest."""
     before = kept(given[k, lane])
     given[k, lane] = select(is_due, worse(off, before), before)
 
 
 def _sweep_group(matter, grains, touches, group, arrays, sweep):
-    """Improve the impulses of some lanes of a group, as bits."""
+    """Improve the impulses in some lanes of a group, as bits."""
     (g, lanes), (begun, given) = group, arrays
     rows, q, ends, e = of_group(touches, g)
     read_ends(grains.speed, ends, e, begun, _SLIP)
@@ -375,7 +374,7 @@ def _sweep_group(matter, grains, touches, group, arrays, sweep):
 
 
 def _rub_group(matter, grains, touches, group, arrays, sweep):
-    """Improve the impulses of some lanes of a group with those of friction, as `_sweep_group`."""
+    """Improve impulses and friction in some lanes of a group, as bits."""
     (g, lanes), (begun, given) = group, arrays
     rows, q, ends, e = of_group(touches, g)
     read_ends(grains.speed, ends, e, begun, _SLIP)
@@ -410,7 +409,7 @@ def _all_lanes(touches, g, sweep):
 
 
 def _due_lanes(touches, g, sweep):
-    """The lanes of a group with contacts that a sweep goes over, as bits."""
+    """The lanes of a group with contacts that are due in a sweep, as bits."""
     if sweep.number == 0:
         return _ALL_LANES
     _rows, _q, ends, e = of_group(touches, g)
@@ -422,7 +421,7 @@ def _due_lanes(touches, g, sweep):
 
 
 def _part_from(begin, lanes, splits):
-    """Where the part of a group that begins in a lane ends."""
+    """The end of the part of a group that begins in a lane."""
     end = lanes
     if splits >> (begin + 1) != 0:
         end = begin + 1
@@ -453,7 +452,7 @@ def _over_groups(one, lanes_of, matter, grains, touches, sweep):
 
 @outlined
 def sweep_pairs(matter, grains, touches, share):
-    """Improve the impulse of each pair; the largest change of one, relative to what moves there."""
+    """Improve the impulse of each pair; return the largest relative change."""
     worst, _pressed = _over_groups(_sweep_group, _all_lanes, matter, grains, touches, ContactSweep(0, share, 0.0, 1.0))
     return worst
 
@@ -462,6 +461,6 @@ def sweep_pairs(matter, grains, touches, share):
 def rub_pairs(matter, grains, touches, sweep):
     """Improve the impulse and the friction of each pair that is due.
 
-    The largest change, relative to what moves there, and the largest of normal impulses.
+    Return the largest relative change, and the largest one of normal impulses.
     """
     return _over_groups(_rub_group, _due_lanes, matter, grains, touches, sweep)

@@ -1,6 +1,7 @@
-"""Lists of what is near: balls in the order of cells, the pairs of each within a reach, the balls near each wall.
+"""Lists of neighbours: balls in the order of cells, the pairs of each ball within a reach, the balls near each wall.
 
-A ball looks for those after it in the rows of cells around it; a row is one part of the order where nothing repeats.
+A ball looks for the balls after it in the rows of cells around its own; along an axis that does not repeat, a row of
+cells is one part of the order.
 """
 
 from typing import Any, NamedTuple
@@ -21,12 +22,12 @@ from .grain_arrays import set_vector, vector_at
 from .heavy_walls import is_heavy
 from .vessel import list_in_field
 
-# More cells than this along an axis, of which three numbers still make one.
+# The most cells along an axis: the numbers along three axes still fit into one integer.
 _MOST_CELLS = 1 << 20
 
 
 class CellOrder(NamedTuple):
-    """The cells of one time: of each ball its cell as a number, in order; how many numbers a row and a layer have."""
+    """The cells at one time: the number of each ball's cell, in ascending order, and the strides of these numbers."""
 
     key: Array  # (N,) int64
     counts: Array  # (3,) of cells along each axis
@@ -35,8 +36,8 @@ class CellOrder(NamedTuple):
 
 
 def cells_of(centres: NDArray[np.float64], reach: float, period: Any) -> tuple[CellOrder, NDArray[np.int64]]:
-    """The `CellOrder` of balls at centres (N, 3), no narrower than a reach, and the order of balls by them."""
-    # Of columns: of rows of three NumPy takes ten times as long.
+    """Return the `CellOrder` of centres (N, 3) with cells no narrower than a reach, and the order of balls by cell."""
+    # Extremes are taken by columns, as NumPy takes ten times as long for rows of three numbers.
     x, y, z = centres.T
     low, high = np.array([[k.min(), k.max()] for k in (x, y, z)]).T if len(centres) else np.zeros((2, 3))
     wraps = np.zeros(3, np.bool_)
@@ -46,7 +47,7 @@ def cells_of(centres: NDArray[np.float64], reach: float, period: Any) -> tuple[C
     counts = np.clip(np.floor((high - low) / reach), 1, _MOST_CELLS).astype(np.int64)
     width = np.where(high > low, (high - low) / counts, 1.0)
     cell = np.clip(np.floor((centres - low) / width), 0, counts - 1).astype(np.int64) + 1
-    # A cell without balls on each side: no row runs into the next one.
+    # There is a cell without balls on each side, so that no row runs into the next one.
     strides = np.array([1, counts[0] + 2, (counts[0] + 2) * (counts[1] + 2)], np.int64)
     key = cell @ strides
     order = np.argsort(key, kind="stable")
@@ -54,7 +55,7 @@ def cells_of(centres: NDArray[np.float64], reach: float, period: Any) -> tuple[C
 
 
 def _first_from(key, wanted, guess):
-    """The first place in ascending numbers where one is no less than what is wanted, from a guess on step by step."""
+    """Return the first place in ascending numbers with a number of at least `wanted`, step by step from a guess on."""
     at = guess
     while at > 0 and key[index(at - 1)] >= wanted:
         at -= 1
@@ -64,18 +65,18 @@ def _first_from(key, wanted, guess):
 
 
 def _beside(cells, k, here, step):
-    """The number of a cell along an axis that is one step beside another one."""
+    """The number along an axis of the cell that is a step away from the cell `here`."""
     return wrapped(here + step - 1, cells.counts[k]) + 1 if cells.wraps[k] else here + step
 
 
 def _is_again(cells, k, step):
-    """Whether a step along an axis leads to a cell that another step has led to: of few cells that wrap."""
+    """Whether a step along an axis leads to a cell that another step has reached, as it may where few cells wrap."""
     return bool(cells.wraps[k]) & ((cells.counts[k] < 2) & (step != 0) | (cells.counts[k] < 3) & (step < 0))
 
 
 @outlined
 def _list_between(period, grains, near, span, i, found):
-    """List the pairs of ball i with those after it between two places; how many are listed then."""
+    """List the pairs of ball i with the balls in a span of the order; return how many pairs are listed then."""
     place, (begin, end, skin) = grains.place, span
     here, radius = vector_at(place, i, col.X), place[i, col.RADIUS]
     for k in range(begin, end):
@@ -91,7 +92,7 @@ def _list_between(period, grains, near, span, i, found):
 
 @long_kernel
 def list_pairs(period, grains, near, cells, skin):
-    """List all pairs that are nearer than the sum of their radii and the skin; how many there are, listed or not."""
+    """List all pairs nearer than the sum of their radii and the skin; return their number, also beyond the room."""
     key, strides, found, ways = cells.key, cells.strides, 0, scratch((3, 3, 3), np.int64)
     for a in range(key.size):
         i = index(a)
@@ -116,13 +117,13 @@ def list_pairs(period, grains, near, cells, skin):
 
 
 def _list_cells(period, grains, near, given, some, way, found):
-    """List the pairs of a ball with those after it in some cells of a row; how many are listed then.
+    """List the pairs of a ball with the balls after it in some cells of a row; return how many are listed then.
 
-    `some` are the middle one, and how many there are on each side; `way` is that from the ball's cell to them.
+    `some` is the middle cell, and the number of cells on each side of it; `way` leads from the ball's cell to them.
     """
     (cells, skin, a, ways), (middle, around), (up, aside, along) = given, some, way
-    # Where those of the ball before began, which was in the same cell or in one not far before: from there it is a
-    # step or two, where a search through all of them takes longer than the distances of the pairs.
+    # The search begins at the result of the ball before, which was in this cell or one not far before it: from there
+    # it takes a step or two, while a search through the whole order takes longer than the distances of the pairs.
     first = _first_from(cells.key, middle - around, ways[index(up), index(aside), index(along)])
     ways[index(up), index(aside), index(along)] = first
     begin = max(first, a + 1)
@@ -131,13 +132,13 @@ def _list_cells(period, grains, near, given, some, way, found):
 
 
 def _depth(wall, r):
-    """How deep a ball is in a wall, to first order, which may be off by half of itself; of faces that end, at most."""
+    """The depth of a ball in a wall to first order, which may be off by half; for faces that end, an upper bound."""
     return -wall.clearance(r) if isinstance(wall, JoinedFaces) else wall.distance(r)
 
 
 @outlined
 def _list_at_wall(wall, grains, near, skin, found):
-    """List the balls near a wall, of one that moves by itself all; how many are listed then."""
+    """List the balls near a wall, or all balls if it has a prescribed motion; return how many are listed then."""
     place, always = grains.place, isinstance(wall, Posed) and not is_heavy(wall)
     for k in range(place.shape[0]):
         i = index(k)
@@ -152,9 +153,9 @@ def _list_at_wall(wall, grains, near, skin, found):
 
 @long_kernel
 def list_walls(walls, faces, grains, near, skin, remaining):
-    """List the balls near each wall when so much of the frame is left [s]; how many there are, listed or not.
+    """List the balls near each wall, with `remaining` [s] of the frame left; return their number, also beyond the room.
 
-    `faces` are, of each field, of each member the number of its face, or of the body that it is.
+    `faces` has, for each field, the number of the face, or of the body, to which each member belongs.
     """
     found = 0
     if near.used is not None:

@@ -1,8 +1,8 @@
-"""The log of contacts: of each one a row where it ends, with what its steps have added up.
+"""The log of contacts: a row of each contact when it ends, with the sums over its steps.
 
-A contact begins with the first step that ends with an overlap of two balls, or of a ball and a wall, and ends with the
-first one that ends without it: in all other steps its impulse is 0. What is noted of it meanwhile is kept beside its
-friction, by its pair, or its ball and the face of the wall, also where lists are made anew.
+A contact begins with the first step that ends with an overlap of two balls, or of a ball and a wall. It ends with the
+first step that ends without an overlap. In all other steps its impulse is 0. Its notes are kept with its friction, by
+the pair, or by the ball and the face of the wall, also where lists are made anew.
 """
 
 from typing import Any, NamedTuple
@@ -23,17 +23,17 @@ from .vessel import met_member
 
 
 class Noting(NamedTuple):
-    """What the log of contacts takes besides them."""
+    """The log of contacts, and the arrays that its rows need besides the contacts."""
 
     log: Log
     period: Any  # `Period` of the cell, or None
-    image: Any  # (3, N) where the cells are in which the lists were made, or None
+    image: Any  # (3, N) the cells in which the balls were when the lists were made, or None
 
 
 def _note(matter, rubs, contact, kept, time):
-    """Add a step that ends at a time [s] to what is noted of a contact; whether that begins in it."""
+    """Add a step that ends at a time [s] to the notes of a contact; return whether the contact begins in it."""
     gap, k = contact.number(col.GAP), contact.listed()
-    # The second one at the start of the run.
+    # The second condition is that of a contact that exists at the start of the run.
     begins = (gap <= 0.0) | (kept[k, col.PRESSED] == 0.0)
     if begins:
         kept[k, col.BEGAN] = time - matter.h
@@ -48,7 +48,7 @@ def _note(matter, rubs, contact, kept, time):
 
 @outlined
 def note_pairs(matter, grains, near, touches, time):
-    """Add a step that ends at a time [s] to what is noted of the contacts of pairs."""
+    """Add a step that ends at a time [s] to the notes of the contacts of pairs."""
     for g in range(touches.used[1]):
         for k in range(touches.lanes[index(g)]):
             contact, (i, j) = pair_at(touches, g, index(k))
@@ -59,7 +59,7 @@ def note_pairs(matter, grains, near, touches, time):
 
 @outlined
 def note_wall(matter, law, wall, grains, near, touches, noting, given):
-    """The same of the contacts with a wall; `given` is its number, and the time."""
+    """Log the contacts with a wall that have ended in the step; `given` is the number of the wall, and the time [s]."""
     rows, (number, time) = touches.wall_rows, given
     begin = touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
@@ -74,7 +74,7 @@ def note_wall(matter, law, wall, grains, near, touches, noting, given):
 
 
 def _row(noting, at, kept, k, time, slip):
-    """A row of a contact with what is noted in row k; `at` is a `Struck` without it, in no cell."""
+    """Log a contact with its notes in row k of `kept`; `at` is a `Struck` without notes, not wrapped into the cell."""
     lasted = Lasted(time - kept[k, col.BEGAN], kept[k, col.FORCE], kept[k, col.TAKEN_OFF])
     back = into(noting.period, at.r)
     struck = at._replace(
@@ -85,7 +85,7 @@ def _row(noting, at, kept, k, time, slip):
 
 @outlined
 def log_pairs(matter, world, time):
-    """The rows of the contacts of pairs that have ended in the step, which is done, at a time [s]."""
+    """Log the contacts of pairs that have ended in the step that is done, which ended at a time [s]."""
     grains, near, touches, noting = world.grains, world.near, world.touches, world.noting
     speed = grains.speed
     for g in range(touches.used[1]):
@@ -104,7 +104,7 @@ def log_pairs(matter, world, time):
 
 @outlined
 def log_wall(matter, wall, world, given):
-    """The same of the contacts with a wall; `given` is its number, and the time."""
+    """Log the contacts with a wall that have ended in the step; `given` is the number of the wall, and the time [s]."""
     grains, near, touches, noting = world.grains, world.near, world.touches, world.noting
     rows, (number, time) = touches.wall_rows, given
     begin = touches.wall_spans[0, number]

@@ -1,4 +1,4 @@
-"""The matter of soft balls as kernels take it, from a scene and its method, and what is checked before a run."""
+"""The `Matter` of soft balls that kernels take, made from a scene and its method, and the checks before a run."""
 
 import logging
 import math
@@ -22,15 +22,15 @@ from .contacts import Losses, Matter
 from .overlaps import Limits
 
 _LOG = logging.getLogger("swarm")
-# The least restitution with a damper that steps can follow.
+# The least restitution that steps can follow: the damper of a smaller one is too strong.
 _MOST_DAMPED = 0.01
-# Steps in the shortest contact, or in half a period of a spring: with fewer than the first there is a warning, which
-# proposes the second.
+# Steps in the shortest contact, or in half a period of a spring. With fewer than `_FEWEST` there is a warning, which
+# proposes `_GOOD`.
 _FEWEST, _GOOD = 6.0, 20.0
 
 
 def matter_of(compiled: CompiledScene, method: Method, radius: NDArray[np.float64]) -> Matter:
-    """What is the same for all balls of a scene, with these radii, and all steps of a method."""
+    """Return the `Matter` of a scene with balls of these radii, in steps of a method."""
     scene = compiled.scene
     pairs, law, dt = scene.pairs or Pairs(), method.law(), float(method.dt)  # type: ignore[attr-defined]
     surfaces = [compiled.pieces.each[i] for i in compiled.numbering.pieces_of_rows]
@@ -48,21 +48,21 @@ def matter_of(compiled: CompiledScene, method: Method, radius: NDArray[np.float6
 
 
 def _limits(least: float, longest: float | None, way: float) -> Limits:
-    """The `Limits` of balls with radii from the least one on [m], at walls that move so far in a step by themselves."""
-    # In a move of no more than the least radius no ball passes another's surface, or a triangle, with less than half of
-    # that overlap at both ends; against a wall that moves its way counts too.
+    """Return the `Limits` of balls with the least radius `least`, where walls move by up to `way` in a step [m]."""
+    # A ball that moves by no more than the least radius, and overlaps by less than half of it at both ends of the step,
+    # passes neither a triangle nor the surface of another ball. The way of a moving wall adds to the move.
     move = max(least - way, 0.0)
     return Limits(0.5 * least, move if longest is None else min(move, longest), longest)
 
 
 def _losses(alpha: float, given: Pairs | Surface) -> Losses:
-    """What is lost at contacts of pairs, or with a surface."""
+    """Return the `Losses` at contacts of pairs, or at contacts with a surface."""
     friction = given.friction if given.friction or given.rolling else None
     return Losses(damping_of(alpha, given.restitution), friction, given.rolling or None)
 
 
 def require_soft_balls(scene: Scene, particles: Particles, method: Method) -> None:
-    """Raise a `SceneError` where dampers or steps of soft balls are out of range."""
+    """Raise a `SceneError` if dampers or steps of soft balls are out of range."""
     if not isinstance(method, Penalty):
         return
     _require_damping(scene)
@@ -83,7 +83,7 @@ def _require_damping(scene: Scene) -> None:
 
 
 def _require_steps(particles: Particles, method: Penalty) -> None:
-    """Raise a `SceneError` where a step is so long that the fastest ball can jump over another one."""
+    """Raise a `SceneError` if the fastest ball can jump over another ball in a step."""
     radius, velocity = particles.radius, particles.velocity
     assert radius is not None
     if not len(particles):
@@ -101,7 +101,7 @@ def _require_steps(particles: Particles, method: Penalty) -> None:
 
 
 def _warn_of_steps(scene: Scene, particles: Particles, method: Penalty) -> None:
-    """Warn where a step is a large part of a contact."""
+    """Warn if a step is a large part of a contact."""
     if not len(particles):
         return
     lightest, fastest = float(particles.mass.min()), particles.fastest()
@@ -119,7 +119,7 @@ def _warn_of_steps(scene: Scene, particles: Particles, method: Penalty) -> None:
 
 
 def _warn_of_springs(scene: Scene, method: Penalty) -> None:
-    """Warn where a step is a large part of half a period of a wall on a spring."""
+    """Warn if a step is a large part of half a period of a wall on a spring."""
     for i, surface in enumerate(scene.surfaces):
         motion, mass = surface.motion, surface.mass
         if mass is not None and isinstance(motion, Guide) and motion.stiffness > 0.0:
@@ -132,10 +132,11 @@ def _warn_of_springs(scene: Scene, method: Penalty) -> None:
 
 
 def _contact_time(scene: Scene, method: Penalty, mass: float, speed: float) -> float:
-    """The duration of a contact without losses [s], of a mass that moves alone [kg] and comes with a speed [m/s].
+    """The duration of a contact without losses [s], of one moving mass [kg] that arrives with a speed [m/s].
 
-    Of m g'' = -alpha g^a from g = 0 with the speed u: 2 sqrt(pi) Gamma(1 + p)/Gamma(1/2 + p) G/u, where p = 1/(a + 1)
-    and G is the deepest gap, m u^2/2 = alpha G^(a + 1)/(a + 1).
+    The solution of m g'' = -alpha g^a that leaves g = 0 with the speed u is back at g = 0 after
+    2 sqrt(pi) Gamma(1 + p)/Gamma(1/2 + p) G/u, where p = 1/(a + 1) and G is the largest gap,
+    m u^2/2 = alpha G^(a + 1)/(a + 1).
     """
     a, alpha = float(method.exponent), float(method.penalty)
     p = 1.0 / (a + 1.0)

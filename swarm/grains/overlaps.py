@@ -1,9 +1,9 @@
-"""Overlaps that no contact may have: a ball with a centre that has passed the surface of what it meets.
+"""Overlaps that no contact may have: the centre of a ball has passed the surface of a wall or of another ball.
 
-From there a contact pushes the wrong way, or pulls the ball through: the step is refused. Most steps are known to be
-far from it by their largest overlap and their longest move; the others are looked at here, every pair and every ball at
-a wall along the straight way of the step. There too a step is refused in which a ball jumps over what it would have
-met, for contacts are looked for at the ends of steps alone.
+From there a contact pushes the wrong way, or pulls the ball through: the step is refused. The largest overlap and the
+longest move rule this out for most steps. In the other steps every pair, and every ball at a wall, is checked here
+along the straight way of the step. A step in which a ball jumps over a wall or a ball is refused too, for contacts are
+looked for only at the ends of steps.
 """
 
 import math
@@ -25,17 +25,17 @@ from .grain_arrays import vector_at
 from .heavy_walls import is_heavy, now
 from .vessel import is_of_faces, met, moves
 
-# Columns of the failure of a step: the place of a ball in the order of cells, that of the other one or -1, the wall or
-# -1, and the overlap [m], or the length of the move if the step is too long.
+# Entries of the failure of a step: the place of a ball in the order of cells, the place of the other ball or -1, the
+# wall or -1, and the overlap [m], or the length of the move if the step is too long.
 BALL, OTHER, WALL, SIZE, COLUMNS = 0, 1, 2, 3, 4
 
 
 class Limits(Record):
-    """Steps that need no look: overlaps and moves below these."""
+    """The overlaps and moves up to which a step needs no check."""
 
     overlap: float  # [m]
     move: float  # [m]
-    longest: Any  # the longest move that jumps over no solid [m], or None in a scene without solids
+    longest: Any  # the longest move that cannot jump over a solid [m], or None in a scene without solids
 
 
 def _note(failed, ball, other, wall, size):
@@ -44,7 +44,7 @@ def _note(failed, ball, other, wall, size):
 
 @outlined
 def look_at_pairs(matter, grains, near, failed):
-    """The `Status` of a step by its pairs: TOO_FAST, TOO_DEEP or DONE; of the deepest one `failed` says which it is."""
+    """Return the `Status` of a step by its pairs: TOO_FAST, TOO_DEEP or DONE; write the deepest pair into `failed`."""
     place, status, deepest = grains.place, Status.DONE.value, 0.0
     for a in range(place.shape[0]):
         i = index(a)
@@ -63,7 +63,7 @@ def look_at_pairs(matter, grains, near, failed):
 
 
 def _passed(face, r, move):
-    """How far a move that leads through a part of a face ends behind it [m], -1 where it does not."""
+    """The depth behind a part of a face at which a move through the part ends [m]; -1 for any other move."""
     if isinstance(face, Rotated):
         return _passed(face.body, face.place_in(r), face.vector_in(move))
     return face.passed_by(r, move)
@@ -71,7 +71,7 @@ def _passed(face, r, move):
 
 @outlined
 def _passed_any(wall, near, k, r, move):
-    """The same of all that are listed in row k."""
+    """The largest depth of `_passed` among the parts of faces listed in row k."""
     most = -1.0
     for m in range(near.spans[k, col.BEGIN], near.spans[k, col.END]):
         most = max(most, _passed(member(members_of(wall.members), index(near.listed[index(m)])), r, move))
@@ -80,7 +80,7 @@ def _passed_any(wall, near, k, r, move):
 
 @outlined
 def look_at_wall(matter, wall, grains, near, failed, number):
-    """The same of a step by the balls at a wall."""
+    """Return the `Status` of a step by the balls at a wall; write the deepest one into `failed`."""
     place, status, deepest, longest = grains.place, Status.DONE.value, -math.inf, matter.limits.longest
     for k in range(near.wall_first[number], near.wall_first[number + 1]):
         c = index(k)
@@ -90,7 +90,7 @@ def look_at_wall(matter, wall, grains, near, failed, number):
         r, move, radius = vector_at(place, i, col.X), move_of(matter, grains, i), place[i, col.RADIUS]
         own = met(wall, near.listed, near.spans, c, radius)
         overlap = max(own.gap_of(own.inner(r)), own.gap_of(own.end_inner(r + move)))
-        # A step over an edge
+        # A step may lead over an edge.
         if not moves(wall):
             overlap = max(overlap, own.gap_of(own.inner(r + 0.5 * move)))
         elif own.pose.turn is None:
@@ -104,7 +104,7 @@ def look_at_wall(matter, wall, grains, near, failed, number):
             move = move - own.displacement()
         is_through = overlap > radius
         if isinstance(wall, Field) and is_of_faces(members_of(wall.members).like):
-            # Far behind a part of a face its distance does not tell the sides apart.
+            # Far behind a part of a face, the distance to it no longer tells its sides apart.
             depth = _passed_any(wall, near, c, r, move)
             is_through = is_through | (depth >= 0.0)
             overlap = max(overlap, radius + depth) if depth >= 0.0 else overlap

@@ -1,4 +1,4 @@
-"""Counters of soft balls: they get the move of each centre in a step, and change no bit of it."""
+"""Counters of soft balls. They read the move of each centre in a step, and change no bit of it."""
 
 from typing import Any, NamedTuple
 
@@ -12,17 +12,17 @@ from .grain_arrays import vector_at
 
 
 class Passing(NamedTuple):
-    """What counters of soft balls write to, and know, by the numbers of particles."""
+    """The arrays that counters of soft balls read and write, in the order of the particles' numbers."""
 
     mass: Array  # (N,) [kg]
     crossed: Any  # `Crossed`
     period: Any  # `Period` of the cell, or None
-    image: Any = None  # (3, N) where the cells are in which the lists were made, or None
+    image: Any = None  # (3, N) the cells in which the balls were when the lists were made, or None
 
 
 @outlined
 def count_moves(matter, grains, followed):
-    """Count what all centres cross in the step; `followed` is a `Followed` of `Passing`, its log ends with the step."""
+    """Count the crossings of all centres in the step; `followed` is a `Followed` of `Passing`, its log ends there."""
     period, log, first = followed.state.period, followed.log, 0
     for k in range(grains.place.shape[0]):
         i = index(k)

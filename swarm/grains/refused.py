@@ -19,7 +19,7 @@ from .overlaps import BALL, OTHER, SIZE, WALL
 
 
 def unsolved(moment: float, dt: float) -> str:
-    """Of impulses that did not converge, in the step of a length [s] at a moment [s]."""
+    """The sentence on impulses that did not converge in the step of the length dt [s] at a moment [s]."""
     return (
         f"the step at {moment:.9g} s failed: the impulses of its contacts did not converge; take a smaller "
         f"dt than {dt:g} s, or a softer penalty; if neither helps, look for a gap or an edge between walls that is "
@@ -28,7 +28,7 @@ def unsolved(moment: float, dt: float) -> str:
 
 
 def too_far(world: Any, most: float, largest: float, dt: float) -> str:
-    """Of a move by more than so many radii of the largest ball [m], for which there are no lists."""
+    """The sentence on a move by more than `most` radii of the largest ball [m], too far for lists."""
     found = (*_fastest(world.grains), "particle ")
     if world.heavy is not None:
         found = max((*_fastest(world.heavy), "surface "), found)
@@ -40,7 +40,7 @@ def too_far(world: Any, most: float, largest: float, dt: float) -> str:
 
 
 def _fastest(rows: Any) -> tuple[float, int]:
-    """The largest sum of squares of the velocities at both ends of a step, infinite for no number, and of which one."""
+    """Return the largest sum of squared velocities at both ends of a step, infinite for NaN, and the row's number."""
     if not len(rows.number):
         return 0.0, -1
     speed = rows.speed
@@ -51,7 +51,7 @@ def _fastest(rows: Any) -> tuple[float, int]:
 
 
 def sent_wrong(compiled: CompiledScene, world: Any, moment: float) -> str:
-    """Of a ball to which a law of a wall gave a velocity that may not be, in the step that ends at a moment [s]."""
+    """The sentence on a ball with an invalid velocity from a law of a wall, in the step that ends at a moment [s]."""
     grains, failed = world.grains, world.books.failed
     i, surface = int(failed[BALL]), compiled.numbering.surfaces_of_rows[int(failed[WALL])]
     return (
@@ -61,7 +61,7 @@ def sent_wrong(compiled: CompiledScene, world: Any, moment: float) -> str:
 
 
 def passed(compiled: CompiledScene, method: Penalty, matter: Any, world: Any, status: int, moment: float) -> str:
-    """Of a ball that passes the surface of another one, or of a wall, in the step at a moment [s]."""
+    """The sentence on a ball that passes the surface of another ball, or of a wall, in the step at a moment [s]."""
     grains, failed = world.grains, world.books.failed
     i, j, wall = (int(failed[k]) for k in (BALL, OTHER, WALL))
     size, where = float(failed[SIZE]), ", ".join(f"{x:.6g}" for x in grains.place[i, col.X : col.X + 3])
@@ -74,7 +74,7 @@ def passed(compiled: CompiledScene, method: Penalty, matter: Any, world: Any, st
     if status == Status.TOO_FAST:
         reach = sum(radii)
         if wall >= 0:
-            # With the way of a solid that moves by itself.
+            # The way of a moving solid is added.
             reach, _solid = thinnest(compiled.scene, method.dt, balls=True)
             size += reach - matter.limits.longest
         room = f"their radii are {reach:.3g} m in all" if wall < 0 else f"the thinnest solid is {reach:.3g} m thick"
@@ -82,19 +82,19 @@ def passed(compiled: CompiledScene, method: Penalty, matter: Any, world: Any, st
             f"{begin}moves by {size:.3g} m against {met} in one step, and {room}, so that it can jump over it; use "
             f"dt < {reach / size * method.dt:.2g} s, a smaller speed, or Impact"
         )
-    # How many balls share its energy is not known.
+    # How many balls share the energy of a wall with a mass is not known.
     presses = "" if world.heavy is None else ", and more where a wall with a mass squeezes it"
     wanted = _penalty(method, matter, grains, (i, j), size, MOST_PRESSED * min(radii))
     least = "the radius of the smaller one" if wall < 0 else "its radius"
     return (
-        f"{begin}overlaps {met} by {size:.4g} m, more than {least}, {min(radii):g} m, and what comes after is wrong: "
+        f"{begin}overlaps {met} by {size:.4g} m, more than {least}, {min(radii):g} m, and its further motion is wrong: "
         f"contacts are too soft for the speed; use a penalty of {wanted:.1e} or more{presses}, got {method.penalty:g}, "
         "with a dt that fits it, a smaller speed, or Impact"
     )
 
 
 def _penalty(method: Penalty, matter: Any, grains: Any, ends: tuple[int, int], overlap: float, allowed: float) -> float:
-    """The penalty with which a contact would overlap by what is allowed [m], by its energy at the start of the step."""
+    """The penalty with which a contact of its energy at the start of the step overlaps by `allowed` [m]."""
     i, j = ends
     place, speed = grains.place, grains.speed
     stored, v, ease = matter.law.stored_energy(overlap), vector_at(speed, i, col.BEFORE), place[i, col.LIGHTNESS]

@@ -1,10 +1,10 @@
 """Resistance to rolling at the contacts of a step.
 
-A contact with the normal impulse J resists the angular velocity w_i - w_j across its normal, or that relative to a
-wall, by an angular impulse of at most rolling R J, with R = R_i R_j/(R_i + R_j), or the radius at a wall. It stops the
-rolling where less is enough, and is opposite for both balls, so that angular momentum is conserved. This is the model
-of a directional constant torque of Zhou, Wright, Yang, Xu & Yu, Physica A 269 (1999) 536-553. With Coulomb's friction
-that holds a ball rolls on a plane with a deceleration of 5/7 rolling G.
+A contact with the normal impulse J resists the angular velocity w_i - w_j across its normal, at a wall the one relative
+to the wall. The angular impulse is at most rolling R J, with R = R_i R_j/(R_i + R_j), at a wall the radius, and at most
+the one that stops the rolling. It is opposite for both balls, so that angular momentum is conserved. This is the model
+of a directional constant torque of Zhou, Wright, Yang, Xu & Yu, Physica A 269 (1999) 536-553. With friction that holds,
+a ball rolls on a plane with a deceleration of 5/7 rolling G.
 """
 
 from ..contact.wall_impact import give_work
@@ -26,9 +26,9 @@ def _ease(place, i):
 
 
 def _resist(contact, rolling, sizes, sweep):
-    """The change of the angular impulse of a contact, and the error: of the rolling at the end of the step.
+    """Improve the angular impulse of a contact by the rolling at the end of the step; return the change, and the error.
 
-    `sizes` are the radius R and 1/I.
+    `rolling` is the relative angular velocity and the coefficient, `sizes` the radius R and 1/I.
     """
     (radius, ease), n, roll = sizes, contact.vector(col.IMPULSE), contact.vector(col.ROLL)
     if not square(n) > 0.0:
@@ -40,12 +40,12 @@ def _resist(contact, rolling, sizes, sweep):
     return part, size_of(more * (1.0 / radius)) * contact.number(col.SCALE)
 
 
-# --- Of pairs --------------------------------------------------------------------------------------------
+# --- Pairs -----------------------------------------------------------------------------------------------
 
 
 @outlined
 def roll_pairs(matter, grains, touches, sweep):
-    """Improve the angular impulse of each pair in turn; the largest change, relative to what moves there."""
+    """Improve the angular impulse of each pair in turn; return the largest relative change."""
     place, spin, worst = grains.place, grains.spin, 0.0
     for g in range(touches.used[1]):
         for k in range(touches.lanes[index(g)]):
@@ -77,7 +77,7 @@ def turn_pairs(grains, touches):
 
 @outlined
 def book_rolling_pairs(grains, near, touches, books):
-    """Book what the resistance takes of pairs, and keep its angular impulses for the next step."""
+    """Book the energy that the resistance takes from pairs; keep its angular impulses for the next step."""
     spin = grains.spin
     for g in range(touches.used[1]):
         for k in range(touches.lanes[index(g)]):
@@ -92,7 +92,7 @@ def book_rolling_pairs(grains, near, touches, books):
             books.dissipated[index(grains.number[j])] += lost
 
 
-# --- Of walls --------------------------------------------------------------------------------------------
+# --- Walls -----------------------------------------------------------------------------------------------
 
 
 def _spin_of(wall, grains, touches, c, i):
@@ -103,7 +103,7 @@ def _spin_of(wall, grains, touches, c, i):
 
 @outlined
 def roll_wall(law, wall, grains, touches, number, sweep):
-    """Improve the angular impulse of each ball at a wall; the largest change, as for pairs."""
+    """Improve the angular impulse of each ball at a wall; return the largest relative change."""
     rows, place, spin, begin, worst = touches.wall_rows, grains.place, grains.spin, touches.wall_spans[0, number], 0.0
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)
@@ -130,7 +130,7 @@ def turn_wall(grains, touches, number):
 
 @outlined
 def book_rolling(wall, grains, near, touches, books, number):
-    """Book what the resistance takes of balls at a wall, what the wall gives by it, and keep it."""
+    """Book the energy that the resistance at a wall takes from balls, and the work of the wall; keep its impulse."""
     rows, spin, begin = touches.wall_rows, grains.spin, touches.wall_spans[0, number]
     for k in range(begin, begin + touches.wall_spans[1, number]):
         c = index(k)

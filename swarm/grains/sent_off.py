@@ -1,8 +1,8 @@
-"""The laws of walls with soft balls: they act where a contact ends.
+"""The laws of walls with soft balls: a law acts when a contact ends.
 
-The dampers and the friction of a contact have turned round the normal velocity of a ball by then. Temperatures and
-`laws` make of that what they make of a rigid impact at which the ball arrives with the mirrored velocity: without
-losses that is what `Impact` gives, whatever the penalty. They act on the centre, and the ball keeps its spin.
+By then the contact, with its damper and its friction, has reversed the normal velocity of the ball. Temperatures and
+`laws` treat the end of the contact as a rigid impact at which the ball arrives with the mirrored velocity: without
+losses the result is that of `Impact`, whatever the penalty. They act on the centre, and the ball keeps its spin.
 """
 
 import math
@@ -27,14 +27,14 @@ from .vessel import gives_work, met_member
 
 
 class Sender(NamedTuple):
-    """What laws of walls need besides the walls."""
+    """The laws of walls, and the arrays that they need besides the walls."""
 
     laws: Any  # `Laws` without restitution and friction, which act during a contact
     source: RandomSource
 
 
 class _Facing(Record):
-    """A wall where a contact ends: its outward normal and its velocity, None where no wall moves."""
+    """A wall at the end of a contact: its outward normal, and its velocity or None if no wall moves."""
 
     n: Vec
     u: Any
@@ -50,9 +50,10 @@ class _Facing(Record):
 
 @outlined
 def send_off(matter, wall, world, given_time):
-    """Let the laws of a wall act on the balls with a contact that has ended in the step, which is done: the `Status`.
+    """Let the laws of a wall act on the balls with contacts that have ended in the step; return the `Status`.
 
-    LEASE_ENDED where it has absorbed any. `given_time` is the number of the wall, and the time [s].
+    The step is done. The `Status` is LEASE_ENDED if the wall has absorbed a ball. `given_time` is the number of the
+    wall, and the time [s].
     """
     grains, touches, (number, time) = world.grains, world.touches, given_time
     begin, status = touches.wall_spans[0, number], Status.DONE.value
@@ -69,18 +70,18 @@ def send_off(matter, wall, world, given_time):
 
 
 def _act(wall, own, world, at, time):
-    """Let the laws of a wall act on a ball."""
+    """Let the laws of a wall act on a ball; return the `Status`."""
     (number, c, i), grains, books, sender = at, world.grains, world.books, world.sender
     place, v = grains.place, vector_at(grains.speed, i, col.BEFORE)
     r, radius = vector_at(place, i, col.X), place[i, col.RADIUS]
-    # Some normals are of length 1 on the wall alone, and the contact has ended a little off it.
+    # Some normals have the length 1 only on the wall, and the contact has ended a little off it.
     n, u = own.unit_normal(r), None
     n = n * (1.0 / math.sqrt(square(n)))
     if sender.laws.moving is not None:
         u = own.velocity(r + radius * n) if isinstance(own, Posed) else ZERO
     away = -dot(v if u is None else v - u, n)
     if not away > 0.0:
-        # Another one has pushed it back, or a law.
+        # Another contact, or a law, has pushed the ball back.
         return Status.DONE.value
     one, touches = index(grains.number[i]), world.touches
     member = world.places[number][index(met_member(wall, touches.listed, touches.spans, c, radius, r))]

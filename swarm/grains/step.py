@@ -1,8 +1,8 @@
 """Steps of soft balls, from frame to frame.
 
 A step gathers the contacts that may exist, solves for the impulses, and checks whether these have led to new contacts.
-Its end follows from its impulses, each of which is there twice with opposite signs: momentum does not depend on
-how well they are solved.
+The velocities at its end follow from the impulses, each of which acts on two bodies with opposite signs: momentum
+is conserved however well the impulses are solved.
 """
 
 import math
@@ -31,52 +31,54 @@ from .rolling import book_rolling, book_rolling_pairs, roll_pairs, roll_wall, tu
 from .sent_off import send_off
 from .vessel import SweptWall, moves, sweep_of
 
-# A sweep after which the next one would change no impulse by more than this part is the last one; also one that gains
-# no more than half of the one before, if that is round-off of what many large impulses leave of one another.
+# A sweep is the last one if the next one would change no impulse by more than the part `_SOLVED`. It is also the last
+# one if its change is below `_NEARLY` and more than `_GAIN` of the change before: that is round-off of large impulses
+# that nearly cancel.
 _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
-# Where friction acts at every contact, and a damper: 1e-4 of what moves there. Positions, velocities and spins of piles
-# that fall, roll and lie are the same to three digits as with normal impulses to round-off, overlaps to 1e-9 of a
-# radius, of which friction leaves 1e-8 to 6e-6. (Rejected: 1e-9, a sweep less as grains fall, and 2e-6 of a radius in
-# a heap of eight.)
+# `_SOLVED` if friction and a damper act at every contact: 1e-4 of the speeds there. Positions, velocities and
+# spins of piles that fall, roll and lie agree to three digits with those of normal impulses solved to round-off, and
+# overlaps to 1e-9 of a radius; friction leaves errors of 1e-8 to 6e-6. (Rejected: 1e-9, which takes a sweep less as
+# grains fall, and is off by 2e-6 of a radius in a heap of eight.)
 _BESIDE_FRICTION = 1e-10
-# A sweep is not counted on to change less than this part of what the one before did.
+# The ratio of the changes of two successive sweeps is taken to be no less than this.
 _LEAST_RATIO = 0.1
-# Where rolling is resisted friction is solved to this part of its tolerance: a sweep leaves both more of one another. A
-# ball rolls on a plane as far as its energy lasts to 5e-7, and with 1 to 2.4e-6.
+# Where rolling is resisted, friction is solved to this part of its tolerance, as a sweep for both leaves larger errors.
+# The distance that a ball rolls on a plane then agrees with its energy to 5e-7; with 1, to 2.4e-6.
 _ROLLED = 0.5
-# A contact that a sweep for friction changed by less than this part of the tolerance leaves the others of its balls as
-# they are. As grains fall errors follow from this, and how many sweeps there are from the tolerance: beside 0.5 and
-# 0.15, the rms error of velocities in 20 steps is 0.8 to 0.95, in 0.85 of the sweeps; 1.1 in an avalanche and 1.4 at
-# rest, in 0.7 and 0.8 of them.
+# A contact that a sweep for friction changed by less than this part of the tolerance does not make the other contacts
+# of its balls due. As grains fall, errors depend on this number, and the number of sweeps on the tolerance: relative
+# to 0.5 and 0.15, the rms error of velocities in 20 steps is 0.8 to 0.95, in 0.85 of the sweeps; 1.1 in an avalanche
+# and 1.4 at rest, in 0.7 and 0.8 of the sweeps.
 _STIRRING = 0.1
-# Successive over-relaxation of friction, omega = 2/(1 + 1/sqrt(k + 1)) after k slow sweeps, up to the last number; a
-# slow one changes more than the first number of what the one before did. Nearly all contacts of a pile stick, and with
-# omega = 1 a sweep changes 0.985 of what the one before did where 1000 grains lie: four times the sweeps to 1e-7.
+# Successive over-relaxation of friction, omega = 2/(1 + 1/sqrt(k + 1)) after k slow sweeps, up to `_MOST_RELAXED`; the
+# change of a slow sweep is more than `_SLOW` of the change before. Nearly all contacts of a pile stick, and with
+# omega = 1 the ratio of successive changes is 0.985 where 1000 grains lie: four times the sweeps to 1e-7.
 # (Rejected: omega from 1.3 on in all sweeps, half the error where 1000 fall, and 40 times where contacts are few;
 # always 1.7, twice the sweeps as they fall; Anderson's acceleration, 80 sweeps to 4e-7 and 300 to 1e-6 where they lie,
 # and 20 to 1e-8 where they fall; Nesterov's; friction that is extrapolated from step to step: no fewer sweeps;
 # conjugate gradients on the contacts that stick, if these are known: 12 iterations a digit where 1000 lie, 38 where
 # 10 000 do, each of two sweeps.)
 _SLOW, _MOST_RELAXED = 0.25, 1.7
-# Sweeps for friction go on to round-off where they have improved no more contacts than this in a step: a few grains are
-# exact whatever the tolerance is, and no sweep is added for a pile.
+# Sweeps for friction go on to round-off while they have improved no more contacts than this in a step: a few grains are
+# exact whatever the tolerance is, and a pile gets no more sweeps.
 _CHEAP = 128
 _MOST_SWEEPS = 1000
-# So many sweeps for friction, and as many for each digit; then it is given as it is, and so are dampers with changes
-# that are no larger than the second number.
+# The most sweeps for friction are `_RUBS_A_DIGIT`, and as many for each digit of the tolerance. After them friction is
+# taken as it is, and so are dampers with changes no larger than `_LAGGING`.
 _RUBS_A_DIGIT, _LAGGING = 200, 2e-6
-# Where so many sweeps have not brought the changes down to that part, only half as large a share of them is made. Those
-# for friction may be slow without going round in circles: with 20 of them 1000 grains that lie take 5 times as many.
+# Where `_STALLED` sweeps, or `_STALLED_RUBS` for friction, have not brought the changes down to the part `_BETTER`, the
+# share of a change that is made is halved, down to `_LEAST_SHARE`. Sweeps for friction may be slow without a cycle:
+# with 20 in place of 100, 1000 grains that lie take 5 times as many sweeps.
 _STALLED, _STALLED_RUBS, _BETTER, _LEAST_SHARE = 20, 100, 0.7, 1.0 / 64.0
 
 
 class MarchRule(NamedTuple):
-    """How many steps a frame has, the one to stop before, after how many to halt, and the end of the frame [s]."""
+    """How far `march` goes: the length of the frame, the step before which to stop, the most steps of the call."""
 
-    span: float
-    stop: float
-    halt: Array  # (1,)
-    moment: float
+    span: float  # the length of the frame [steps]
+    stop: float  # the step of the frame before which to stop
+    halt: Array  # (1,) the most steps of the call
+    moment: float  # the end of the frame [s]
 
 
 class World(NamedTuple):
@@ -92,17 +94,17 @@ class World(NamedTuple):
     held: Any = None  # `Held`, or None where no wall holds balls
     noting: Any = None  # `Noting`, or None in a run without a log of contacts
     heavy: Any = None  # `Grains` of the walls with a mass, or None
-    places: Any = None  # of each wall, of each member its number in the scene, (members,) int64; None if not needed
+    places: Any = None  # for each wall an array (members,) int64: the number of each member in the scene; or None
 
 
-# --- Of one step -----------------------------------------------------------------------------------------
+# --- One step --------------------------------------------------------------------------------------------
 
 
 @outlined
 def _begin(matter, grains, touches, skin):
-    """The velocities at the end of a step with the last one's change; whether all may move on within the lists.
+    """Set the velocities at the end of the step by the change of the last step; return whether the lists still hold.
 
-    No impulses of pairs are summed yet, and the spins are those of a step without contacts.
+    The sums of the impulses of pairs become 0, and the spins those of a step without contacts.
     """
     place, speed, listed, farthest = grains.place, grains.speed, grains.listed, 0.0
     for k in range(place.shape[0]):
@@ -119,7 +121,7 @@ def _begin(matter, grains, touches, skin):
 
 @outlined
 def _forget_spins(grains):
-    """The spins at the end of a step without contacts."""
+    """Set the spins at the end of the step to those of a step without contacts."""
     if grains.spin is not None:
         for k in range(grains.spin.shape[0]):
             set_vector(grains.spin, index(k), col.AFTER, vector_at(grains.spin, index(k), col.BEFORE))
@@ -127,14 +129,14 @@ def _forget_spins(grains):
 
 @outlined
 def _forget_given(grains):
-    """No impulses of pairs are summed yet."""
+    """Set the sums of the impulses of pairs to 0."""
     for k in range(grains.change.shape[0]):
         set_vector(grains.change, index(k), col.GIVEN, ZERO)
 
 
 @outlined
 def _fly(matter, grains):
-    """The velocities at the end of a step by the impulses of pairs that have been summed; none are after that."""
+    """Set the velocities at the end of the step from the summed impulses of pairs, and these sums to 0."""
     speed = grains.speed
     for k in range(speed.shape[0]):
         i = index(k)
@@ -146,7 +148,7 @@ def _fly(matter, grains):
 
 
 def _gather(matter, walls, world, travel):
-    """Add the contacts, first by where balls are to be, then by their `Travel`; how many are new."""
+    """Add the contacts at the foreseen places, or the missing ones by a `Travel`; return how many are new."""
     grains, near, touches = world.grains, world.near, world.touches
     known = touches.used[0]
     if travel is None:
@@ -162,7 +164,7 @@ def _gather(matter, walls, world, travel):
 
 
 def _push(matter, walls, world):
-    """The velocities at the end of a step by all impulses; those of pairs have been summed."""
+    """Set the velocities at the end of the step from all impulses; impulses of pairs have been summed."""
     grains, touches = world.grains, world.touches
     _fly(matter, grains)
     for k in range(len(walls.each)):
@@ -178,14 +180,14 @@ def _push(matter, walls, world):
 
 
 def _push_again(matter, walls, world):
-    """The same, and the spins, by what the impulses of all contacts have become."""
+    """Set velocities and spins at the end of the step from the current impulses of all contacts."""
     push_pairs(matter, world.grains, world.touches)
     _push(matter, walls, world)
     _turn(matter, walls, world)
 
 
 def _twist_at_walls(matter, walls, world):
-    """Add the twists of walls, and what resists rolling, to the spins at the end of a step."""
+    """Add the twists of walls, and the resistance to rolling, to the spins at the end of the step."""
     grains, touches = world.grains, world.touches
     for k, wall in enumerate(walls.each):
         if matter.walls[k].friction is not None:
@@ -198,7 +200,7 @@ def _twist_at_walls(matter, walls, world):
 
 
 def _turn(matter, walls, world):
-    """The spins at the end of a step by all impulses, where the velocities are known."""
+    """Set the spins at the end of the step from all impulses; the velocities there are known."""
     _forget_spins(world.grains)
     if matter.pairs.friction is not None:
         twist_pairs(matter, world.grains, world.touches)
@@ -206,7 +208,7 @@ def _turn(matter, walls, world):
 
 
 def _sweep(matter, walls, world, share):
-    """Improve all normal impulses by a share of what they are to change; the largest change."""
+    """Improve all normal impulses by a share of their changes; return the largest relative change."""
     grains, touches = world.grains, world.touches
     worst = sweep_pairs(matter, grains, touches, share)
     for k, wall in enumerate(walls.each):
@@ -215,7 +217,7 @@ def _sweep(matter, walls, world, share):
 
 
 def _rub(matter, walls, world, sweep):
-    """Improve all impulses with those of friction; the largest change, and the largest of normal impulses."""
+    """Improve all impulses and friction; return the largest relative change, and the largest of normal impulses."""
     grains, touches, share = world.grains, world.touches, sweep.share
     if matter.pairs.friction is None:
         worst = sweep_pairs(matter, grains, touches, share)
@@ -237,7 +239,7 @@ def _rub(matter, walls, world, sweep):
 
 
 def _stalled(pace, worst, patience):
-    """The share of changes to make, the least change so far, and how many sweeps ago that was."""
+    """Return the share of changes to make, the least change so far, and how many sweeps ago it was."""
     share, best, since = pace
     if worst <= _BETTER * best:
         return share, worst, 0
@@ -247,23 +249,23 @@ def _stalled(pace, worst, patience):
 
 
 def _contacts(walls, touches):
-    """How many contacts there are."""
+    """The number of contacts."""
     return touches.used[0] + sum(touches.wall_spans[1, k] for k in range(len(walls.each)))
 
 
 def _is_round_off(worst, before):
-    """Whether a sweep gains no more than what many large impulses leave of one another."""
+    """Whether the change of a sweep is round-off of large impulses that nearly cancel."""
     return worst <= _NEARLY and worst >= _GAIN * before
 
 
 def _relaxation(slow):
-    """Omega of the sweep after so many that were slow."""
+    """Omega of the sweep after a number of slow sweeps."""
     return min(2.0 / (1.0 + 1.0 / math.sqrt(slow + 1.0)), _MOST_RELAXED)
 
 
 @outlined
 def _solve_friction(matter, walls, world):
-    """Sweep until friction changes little: whether it does, and what the next sweep would change of normal impulses."""
+    """Sweep until friction is solved; return whether it is, and the change of normal impulses in the next sweep."""
     before, worst, sweeps, slow, share, best, since, follows = math.inf, 1.0, 0, 0, 1.0, math.inf, 0, math.inf
     solved = matter.slips * (_ROLLED if matter.rolls else 1.0)
     cheap = _CHEAP // max(_contacts(walls, world.touches), 1)
@@ -275,7 +277,8 @@ def _solve_friction(matter, walls, world):
         worst, pressed = _rub(matter, walls, world, ContactSweep(number, share, stirring, inverse))
         sweeps += 1
         if worst <= (_SOLVED if sweeps < cheap else solved) or _is_round_off(worst, before):
-            # Where this one has seen all contacts, and dampers act: friction has moved the others by that much at most.
+            # The first sweep has seen all contacts. Where dampers act everywhere, its changes bound the next ones of
+            # normal impulses.
             if sweeps == 1 and matter.damped:
                 follows = _LEAST_RATIO * worse(weight_of(matter.pairs) * worst, pressed)
             break
@@ -288,9 +291,9 @@ def _solve_friction(matter, walls, world):
 
 @outlined
 def _solve(matter, walls, world):
-    """Sweep until the impulses solve the step: whether they do, and 1 where friction or a damper lags, else 0."""
+    """Sweep until the impulses solve the step; return whether they do, and 1 if friction or a damper lags, else 0."""
     books, lags, follows = world.books, 0, math.inf
-    # Friction first, to fewer digits: then it is given, and what is to be exact depends on the others alone.
+    # Friction is solved first, to fewer digits. Then it is fixed, and normal impulses alone are solved to round-off.
     if matter.rubs:
         is_rubbed, follows = _solve_friction(matter, walls, world)
         lags = select(is_rubbed, 0, 1)
@@ -301,8 +304,8 @@ def _solve(matter, walls, world):
     while sweeps < _MOST_SWEEPS:
         worst = _sweep(matter, walls, world, share)
         sweeps += 1
-        # What the next one would change, by the ratio of the last two; where only dampers act, as what they take is
-        # booked by what they did.
+        # The change of the next sweep, by the ratio of the last two, is only foreseen where every contact has a damper:
+        # the energy that dampers take is booked from the impulses as they are, so that an error in them loses none.
         follows = worst * max(worst / before, _LEAST_RATIO) if matter.damped and sweeps > 1 else worst
         if follows <= solved or _is_round_off(worst, before):
             break
@@ -317,7 +320,7 @@ def _solve(matter, walls, world):
 
 
 def _forget(walls, world):
-    """No contacts yet."""
+    """Empty the lists of contacts."""
     near, touches = world.near, world.touches
     touches.used[0] = touches.used[1] = 0
     near.is_on[:] = False
@@ -328,7 +331,7 @@ def _forget(walls, world):
 
 @outlined
 def _arrive(matter, grains):
-    """All at the end of the step."""
+    """Move all balls to the end of the step."""
     place, speed, half = grains.place, grains.speed, 0.5 * matter.h
     for k in range(place.shape[0]):
         i = index(k)
@@ -344,7 +347,7 @@ def _arrive(matter, grains):
 
 
 def _note(matter, walls, world, time):
-    """Add the step, which ends at a time [s], to what is noted of contacts."""
+    """Add the step, which ends at a time [s], to the notes of the log of contacts."""
     grains, near, touches = world.grains, world.near, world.touches
     note_pairs(matter, grains, near, touches, time)
     for k, wall in enumerate(walls.each):
@@ -352,16 +355,16 @@ def _note(matter, walls, world, time):
 
 
 def _log(matter, walls, world, time):
-    """The rows of the contacts that have ended in the step, which is done, at a time [s]."""
+    """Log the contacts that have ended in the step that is done, which ended at a time [s]."""
     log_pairs(matter, world, time)
     for k, wall in enumerate(walls.each):
         log_wall(matter, wall, world, (k, time))
 
 
 def _book(matter, walls, world):
-    """Book what the contacts of the step did; the largest overlap [m]."""
+    """Add the contacts of the step to the totals; return the largest overlap [m]."""
     grains, near, touches, books = world.grains, world.near, world.touches, world.books
-    # A line of each group that nothing else is in.
+    # `RUBBED` is a row of each group that nothing else needs.
     notes = world.noting is not None or matter.pairs.rolling is not None
     deepest = book_pairs(matter, grains, near, touches, books, notes)
     if matter.pairs.rolling is not None:
@@ -379,7 +382,7 @@ def _book(matter, walls, world):
 
 
 def _look(matter, walls, world):
-    """The `Status` of a step by its overlaps; `failed` says of which one."""
+    """Return the `Status` of a step by its overlaps; `books.failed` has the one that fails."""
     grains, near, books = world.grains, world.near, world.books
     status = look_at_pairs(matter, grains, near, books.failed)
     for k, wall in enumerate(walls.each):
@@ -389,7 +392,7 @@ def _look(matter, walls, world):
 
 
 def _let_go(matter, world, now):
-    """Let the balls go that have waited until a step that begins now [s]."""
+    """Release the balls that have waited until the start of a step, `now` [s]."""
     if world.held is not None:
         let_go(world.held, world.grains, now, matter.h)
 
@@ -401,7 +404,7 @@ def _open(matter, walls, world):
 
 
 def _let_out(matter, walls, world, time):
-    """Let balls escape in a step that ends at a time; how many do."""
+    """Let balls escape in a step that ends at a time; return how many do."""
     found = 0
     for k, wall in enumerate(walls.each):
         found += let_out(matter, wall, world, (k, time))
@@ -409,7 +412,7 @@ def _let_out(matter, walls, world, time):
 
 
 def _send_off(matter, walls, world, time):
-    """Let the laws of walls act on balls with a contact that has ended in a step, at a time: the `Status`."""
+    """Let the laws of walls act on balls with contacts that have ended in a step; return the `Status`."""
     status = Status.DONE.value
     for k, wall in enumerate(walls.each):
         if status != Status.SENT_WRONG:
@@ -419,14 +422,14 @@ def _send_off(matter, walls, world, time):
 
 
 def _followed_until(world, time):
-    """What counters write to in a step that ends at a time [s]."""
+    """Return the `Followed` of the counters in a step that ends at a time [s]."""
     if world.noting is None:
         return world.followed
     return world.followed._replace(log=world.noting.log._replace(end=time))
 
 
 def _swept(matter, walls, listed, grains, skin):
-    """The `SweptWall` of all fields that move, which were `listed` so."""
+    """Return the `SweptWall` of all moving fields; `listed` are the walls when the lists were made."""
     found = SweptWall(0.0, 0.0)
     for (_number, field), (_first, then) in zip(walls.fields(), listed.fields(), strict=True):
         if moves(field) and not is_heavy(field):
@@ -436,7 +439,7 @@ def _swept(matter, walls, listed, grains, skin):
 
 
 def _begins(matter, walls, listed, world, skin):
-    """`_begin` of balls and of walls with a mass, within the lists of fields that move too."""
+    """Begin the step as `_begin`, with walls with a mass; return whether all lists hold, those of moving fields too."""
     if not _begin(matter, world.grains, world.touches, skin):
         return False
     if world.heavy is not None and not begin_walls(world.heavy, matter.h) <= 0.25 * skin * skin:
@@ -445,7 +448,7 @@ def _begins(matter, walls, listed, world, skin):
 
 
 def _swept_in_all(matter, walls, listed, world, skin, travel):
-    """The `SweptWall` of balls and walls together; `travel` is that of balls."""
+    """Return the `SweptWall` of balls and walls together; `travel` is the `Travel` of the balls."""
     sweep = _swept(matter, walls, listed, world.grains, skin)
     farthest, longest = worse(sweep.farthest, travel.from_list), worse(sweep.longest, travel.longest)
     if world.heavy is None:
@@ -456,13 +459,13 @@ def _swept_in_all(matter, walls, listed, world, skin, travel):
 
 
 def _arrive_walls(matter, world):
-    """The walls with a mass at the end of the step."""
+    """Move the walls with a mass to the end of the step."""
     if world.heavy is not None:
         _arrive(matter, world.heavy)
 
 
 def _step(matter, walls, listed, world, skin):
-    """One step but for its end: its `Status`; LEASE_ENDED where the lists do not hold over it, nothing has changed."""
+    """Solve and book one step; return its `Status`. If the lists do not hold over it: LEASE_ENDED, nothing changed."""
     grains = world.grains
     if not _begins(matter, walls, listed, world, skin):
         return Status.LEASE_ENDED.value
@@ -480,7 +483,7 @@ def _step(matter, walls, listed, world, skin):
         travel = travel_of(matter, grains)
         if _gather(matter, walls, world, travel) == 0:
             break
-        # Those of the new contacts, which are to be summed after the others.
+        # The sums have the impulses of the new contacts alone, which are to be added after the others.
         _forget_given(grains)
         _push_again(matter, walls, world)
     sweep = _swept_in_all(matter, walls, listed, world, skin, travel)
@@ -491,21 +494,21 @@ def _step(matter, walls, listed, world, skin):
         status = _look(matter, walls, world)
         if status != Status.DONE.value:
             return status
-    # Of what solved the step at last, and once of a step that is taken again with new lists.
+    # Only the last solution of a step counts, and a step that is taken again with new lists counts once.
     world.books.lagging[0] += lags
     return Status.DONE.value
 
 
-# --- Of a frame ------------------------------------------------------------------------------------------
+# --- A frame ---------------------------------------------------------------------------------------------
 
 
 @wide_long_kernel
 def march(matter, walls, world, clock, rule):
-    """Take step after step until the end of the frame, or the stop before it: the `Status`.
+    """Take step after step until the end of the frame, or the stop before it; return the `Status`.
 
-    LEASE_ENDED where lists are to be made anew, also where balls have escaped, and LOG_FULL where the log of contacts
-    needs an empty part: then call this again. INTERRUPTED after so many steps as the rule says; it goes on with the
-    same bits.
+    It is LEASE_ENDED where lists are to be made anew, as also after an escape, and LOG_FULL where the log of contacts
+    needs an empty part; the caller calls this again after both. It is INTERRUPTED after `rule.halt` steps; a later
+    call goes on with the same bits.
     """
     while clock[col.DONE] < rule.stop:
         if clock[col.TAKEN] >= rule.halt[0]:

@@ -1,10 +1,10 @@
-"""What a ball meets of a field: bodies, each by itself, or the faces of a vessel, of each the place that is nearest.
+"""The parts of a field that a ball meets: single bodies, or the faces of a vessel, each at its nearest place.
 
-A face is of sides of an outline that join smoothly or at an edge towards the balls, or of triangles of a mesh that are
-in one plane or of a convex body. Its depth is that below the nearest of them: a ball that comes from one triangle to
-the next in their plane has one contact all the time; its depth and normal do not change there, and one that goes over
-an edge turns about it. Where faces meet in a corner around the balls each has a contact of its own, so that a ball is
-held by both. So what contacts store depends on the place of the ball alone, and its discrete gradients keep the energy.
+A face consists of sides of an outline that join smoothly or at an edge towards the balls, or of triangles of a mesh
+that are in one plane or bound a convex body. The depth in a face is the depth below its nearest part: a ball that goes
+from one triangle to the next in their plane keeps one contact, with the same depth and normal, and a ball that goes
+over an edge turns about it. Where faces meet in a corner around the balls, each has its own contact, and a ball is
+held by both. So the stored energy depends only on the place of the ball, and discrete gradients conserve the energy.
 """
 
 import math
@@ -30,9 +30,9 @@ from .heavy_walls import is_heavy
 
 
 class NearestMembers(Smooth):
-    """Some of the members of a field as one wall; phi, the gap, is the distance outside of the nearest one."""
+    """Some members of a field as one wall; phi, the gap, is the distance outside of the nearest member."""
 
-    members: Any  # grown
+    members: Any  # the members, grown by the radius of the ball
     listed: Any  # their numbers, from the first to the one before the stop
     first: Any
     stop: Any
@@ -44,7 +44,7 @@ class NearestMembers(Smooth):
         return _deepest(self, r)
 
     def gradient(self, r):
-        """The unit normal of that member."""
+        """The unit normal of the nearest member."""
         return _outward(self, r)
 
 
@@ -79,7 +79,7 @@ def is_of_faces(like):
 
 
 def met(wall, listed, spans, k, radius):
-    """What the centre of a ball meets of a wall, of a field what the span in row k says."""
+    """The surface that the centre of a ball meets of a wall; in a field, that of the members of the span in row k."""
     grown = wall.grown(radius)
     if not isinstance(wall, Field):
         return grown
@@ -92,7 +92,7 @@ def met(wall, listed, spans, k, radius):
 
 
 def met_member(wall, listed, spans, k, radius, r):
-    """The number of the member of a wall that a ball meets at r, at the end of a step; 0 of one that is no field."""
+    """The number of the member of a wall that a ball meets at r, at the end of a step; 0 if the wall is no field."""
     if not isinstance(wall, Field):
         return 0
     grown = wall.grown(radius)
@@ -109,7 +109,7 @@ def moves(wall):
 
 
 def gives_work(wall):
-    """Whether a wall moves by itself, so that its work is booked: what one with a mass gives it loses."""
+    """Whether a wall has a prescribed motion, so that its work is booked; a wall with a mass loses what it gives."""
     return moves(wall) and not is_heavy(wall)
 
 
@@ -117,9 +117,9 @@ def gives_work(wall):
 
 
 def _enter(end, m, given):
-    """Enter a member that is near in the order of faces, if it is not there yet; the end of the list then."""
+    """Insert a member near a ball into the list, in the order of faces, unless it is listed; return the list's end."""
     members, face, near, (r, skin, begin) = given
-    # A distance to first order, which may be off by half of itself.
+    # The distance is exact to first order, and may be off by half.
     if not member(members, index(m)).distance(r) > -2.0 * skin:
         return end
     k, listed = end, near.listed
@@ -141,7 +141,7 @@ def _enter(end, m, given):
 
 @outlined
 def list_in_field(wall, face, grains, near, skin, found):
-    """List the balls near each face, or each body, of a field; how many are listed then."""
+    """List the balls near each face, or each body, of a field; return how many are listed then."""
     place, grid = grains.place, members_of(wall.members).grid
     for a in range(place.shape[0]):
         i = index(a)
@@ -168,15 +168,15 @@ def list_in_field(wall, face, grains, near, skin, found):
 
 
 class SweptWall(Record):
-    """How far a ball near a field that moves is from where it was listed, and how far a step leads, in its frame."""
+    """The largest distance of a ball near a moving field from its listed place, and in a step, in the field's frame."""
 
-    farthest: Any  # their squares, at most [m^2]
-    longest: Any
+    farthest: Any  # squared [m^2]
+    longest: Any  # squared [m^2]
 
 
 @outlined
 def sweep_of(field, listed, matter, grains, skin):
-    """The `SweptWall` of all balls near a field that moves, `listed` as it was then, by a step."""
+    """Return the `SweptWall` of all balls near a moving field in a step; `listed` is the field when lists were made."""
     place, grid, found = grains.place, members_of(field).grid, SweptWall(0.0, 0.0)
     for k in range(place.shape[0]):
         i = index(k)

@@ -1,4 +1,4 @@
-"""The function `swarm.run`, which carries out a scene file; and the package of runs.
+"""The package of runs, which is also the function `swarm.run` that carries out a scene file.
 
     swarm.run(path, output=None, *, plugins=(), **options) -> swarm.Result
 
@@ -16,16 +16,16 @@ from typing import Any
 
 
 class _Called(ModuleType):
-    """This package as a callable. A function named `run` would hide its modules, or be hidden by them."""
+    """This package as a callable, as a function named `run` would hide its modules, or be hidden by them."""
 
     def __call__(self, path: Any, output: Any = None, *, plugins: Any = (), **options: Any) -> Any:
         """Carry out the run of a scene file; see the function of `authoring.file_run`."""
-        from .engines import wing  # Numba only where something runs
+        from .engines import wing  # Numba is loaded only for a run
 
         return wing("authoring.file_run").run(path, output, plugins=plugins, **options)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle by name, as any other module that code for a cluster refers to."""
+        """Pickle the package by its name, as any module that code for a cluster refers to."""
         return pkgutil.resolve_name, (self.__name__,)
 
 

@@ -1,4 +1,4 @@
-"""The shell of a run, which all engines share."""
+"""The base class of the runs of all engines."""
 
 import bisect
 import itertools
@@ -29,13 +29,13 @@ from .tally import Watched
 from .tiers import Tier
 from .watch import Watch
 
-# A particle this many times the scene's extent away from the origin has escaped from an open scene.
+# The distance from the origin at which a particle has escaped from an open scene, in extents of the scene.
 _FAR = 100.0
-# Beyond this part of the scene's size a particle outside rigid walls is an error; round-off is 1e-15 of it.
+# The part of the size of a scene by which a particle may be outside rigid walls; round-off is 1e-15 of the size.
 OUTSIDE = 1e-9
-# The caller's thread looks for an interrupt so often [s].
+# The time between two looks of the caller's thread for an interrupt [s].
 _GLANCE = 0.1
-# With fewer particles than this a kernel ends before another thread is awake.
+# The least number of particles for several threads: with fewer, a kernel ends before another thread is awake.
 _FEW = 4096
 # The particles between two looks at the halt, compiled and in plain Python: some 0.1 s of work.
 _AT_ONCE, _AT_ONCE_PLAIN = 1 << 16, 8
@@ -46,7 +46,7 @@ T = TypeVar("T")
 class BaseRun:
     """A run from frame to frame: it times, halts, balances and observes an engine. Its threads end with its context.
 
-    The functions in which engines differ come first.
+    The methods in which engines differ come first.
 
     Args:
         compiled, method: the scene and the method.
@@ -58,23 +58,23 @@ class BaseRun:
         pool: the pool of threads; None: a new one.
 
     Attributes:
-        state: what files take of a frame.
+        state: the arrays that files take of a frame.
     """
 
     state: State
-    # The law of soft walls; None where walls are rigid.
+    # The law of soft walls; None for rigid walls.
     _law: Any = None
     # The walls as observed.
     _walls: Any
-    # Where particles have a radius.
+    # The observables of balls; None for points.
     _ball_numbers: BallNumbers | None = None
-    # Where balls come during the run.
+    # The births of balls during the run, or None.
     _feed: Feed | None = None
-    # Where walls react.
+    # The reacting walls as observed, or None.
     _observed: Observed | None = None
-    # The phases other than flight that particles have been in.
+    # The phases other than flight in which particles have been.
     _kinds: Set[int] = frozenset()
-    # The times at which frames are cut into pieces [s]; None: they are not.
+    # The times at which frames are cut into pieces [s]; None for whole frames.
     _instants: Sequence[float] | None = None
 
     def __init__(
@@ -93,9 +93,9 @@ class BaseRun:
         self._threads, self._tier, self._watch = threads, tier, Watch(n)
         self._impacts, self._tally, _counters = watched
         self._size, self._partial = CHUNK, np.zeros((math.ceil(n / CHUNK), observables.ROWS))
-        # The energy at the start [J], and the method's time at the last frame [s].
+        # The energy at the start [J], and the time of the method at the last frame [s].
         self._start, self._moment = np.zeros(1), 0.0
-        # When the frame began [s], how many of its pieces are done, and when it ends [s].
+        # The start of the frame [s], the number of its pieces that are done, and its end [s].
         self._begun, self._done, self._end = np.zeros(1), np.zeros(1, np.int64), 0.0
         self._cut_short = False
 
@@ -109,82 +109,82 @@ class BaseRun:
         self._pool.shutdown(wait=True)
 
     def halt(self, passes: int = 0) -> None:
-        """Make every kernel call of this frame return after so many passes, or events; 0: at once.
+        """Make every kernel call of this frame return after a number of passes, or events; 0: at once.
 
-        It ends when `advance` returns.
+        The halt ends when `advance` returns.
         """
         self._watch.halt(passes)
 
     # --- What differs between engines --------------------------------------------------------------------
 
     def calls(self) -> Iterable[tuple[Any, tuple[Any, ...]]]:
-        """Every kernel of a frame, each with arguments of the types of its next calls."""
+        """Return every kernel of a frame, each with arguments of the types of its next calls."""
         raise NotImplementedError
 
     def _prepare(self, span: float, moment: float) -> None:
-        """Prepare a frame, or what is left of one that was cut short: `span` and `moment` as in `advance`."""
+        """Prepare a frame, or the rest of a frame that was cut short; `span` and `moment` are as in `advance`."""
         raise NotImplementedError
 
     def _turn(self, span: float, moment: float, writing: float, latest: float) -> tuple[int, int]:
-        """Call kernels until the frame is done or halted: (status, the particle or body that it is about)."""
+        """Call kernels until the frame is done or halted; return the status, and its particle or body."""
         raise NotImplementedError
 
     def _goes_on(self, status: int, item: int, seconds: float) -> bool:
-        """Whether another turn follows at once on one that took so many seconds and ended with this status."""
+        """Whether another turn follows at once after a turn of `seconds` [s] that ended with this status."""
         return False
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
-        """The sentence about a frame that failed."""
+        """Return the sentence about a frame that failed."""
         raise NotImplementedError
 
     def _share_done(self, span: float) -> float:
-        """The share of a frame, or of a piece of it, that is done, from 0 to 1."""
+        """Return the share of a frame, or of a piece of a frame, that is done, from 0 to 1."""
         raise NotImplementedError
 
     def furthest_behind(self) -> tuple[int, list[float]] | None:
-        """The particle of a frame that was cut short with the most time left, and where it is [m]; None: not known."""
+        """Return the particle with the most time left in a frame that was cut short, and its place [m], or None."""
         return None
 
     def _arrays(self) -> dict[str, Any]:
-        """The arrays of a checkpoint that only this engine has, as `arrays_of` takes them."""
+        """Return the arrays of a checkpoint that only this engine has, as `arrays_of` takes them."""
         raise NotImplementedError
 
     def _begin(self) -> None:
         """Prepare the observation of the start."""
 
     def _show(self, moment: float) -> None:
-        """Bring the state, and the walls as observed, to a frame at a moment [s]."""
+        """Set the state, and the walls as observed, to a frame at a moment [s]."""
 
     def _with_stored(self, seen: dict[str, Any]) -> dict[str, Any]:
-        """The observables with the energy that contacts store, where the sums over particles are without it."""
+        """Return the observables with the energy of contacts, if the sums over particles do not have it."""
         return seen
 
     def _scale_of(self, seen: dict[str, Any]) -> float | None:
-        """The energy that the error of the energy is relative to [J]; None: the error is that of the worst particle."""
+        """Return the energy to which the error of the energy is relative [J]; None: the error of the worst particle."""
         return None
 
     def _length(self, duration: float) -> float:
-        """The length of a piece of a frame [s] in the unit in which this engine counts it down."""
+        """Return the length of a piece of a frame [s] in the unit of this engine."""
         return self._method.span("the time between two doors", duration)
 
     def _clock_time(self, moment: float) -> float:
-        """The time of this engine at the end of a frame, or of a piece of one [s]."""
+        """Return the time of this engine at the end of a frame, or of a piece of a frame [s]."""
         return self._method.instant(moment)
 
     def _switch(self, instant: float) -> None:
         """Open, shut, add and remove walls at the instant at which a piece of a frame begins [s]."""
 
     def chunk_sums(self) -> NDArray[np.float64]:
-        """The sums over each chunk of particles of the last frame; the sums of a run in shards are made of them."""
+        """Return the sums over each chunk of particles of the last frame, from which a run in shards makes its own."""
         raise NotImplementedError
 
     # --- From frame to frame -----------------------------------------------------------------------------
 
     def advance(self, span: float, moment: float, writing: float = 0.0, latest: float = math.inf) -> bool:
-        """Advance all by `span`, in the method's unit, to a moment [s], and observe them.
+        """Advance all particles by `span`, in the unit of the method, to a moment [s], and observe them.
 
-        Returns whether the frame is done. It is not if `halt` was called, the time `latest` [s of time.monotonic] has
-        come, or the time for plain Python is used up. The next call then continues the frame, with the same bits as
+        Return whether the frame is done. It is not done if `halt` was called, the time `latest` [s of time.monotonic]
+        has come, or the time for plain Python is used up. The next call then continues the frame, with the same bits as
         without the halt. `writing` is the time to write a frame [s].
 
         Raises:
@@ -207,12 +207,12 @@ class BaseRun:
         return True
 
     def _times(self, end: float) -> list[float]:
-        """The times between which the pieces of a frame are."""
+        """Return the times at which the pieces of a frame begin and end."""
         begin, instants = float(self._begun[0]), self._instants or ()
         return [begin, *instants[bisect.bisect_right(instants, begin) : bisect.bisect_left(instants, end)], end]
 
     def _advance_piece(self, span: float, moment: float, writing: float, latest: float) -> bool:
-        """Advance by a piece of a frame, as `advance` does by all of it."""
+        """Advance by a piece of a frame, as `advance` does by a whole frame."""
         self._moment = self._clock_time(moment)
         self._prepare(span, moment)
         again = True
@@ -233,7 +233,7 @@ class BaseRun:
         return not self._cut_short
 
     def share_done(self, span: float) -> float:
-        """The share that is done of a frame that was cut short, on average over the particles or bodies."""
+        """Return the share done of a frame that was cut short, on average over the particles or bodies."""
         if self._instants is None:
             return self._share_done(span)
         k, times = int(self._done[0]), self._times(self._end)
@@ -242,7 +242,7 @@ class BaseRun:
         return float(done / (times[-1] - times[0]))
 
     def arrays(self) -> Arrays:
-        """The arrays of a checkpoint, not copied: `restore` goes on from them with the same bits."""
+        """Return the arrays of a checkpoint, not copied, from which `restore` goes on with the same bits."""
         found = arrays_of(self._arrays())
         if self._instants is not None:
             found |= {"piece.begun": self._begun, "piece.done": self._done}
@@ -251,18 +251,18 @@ class BaseRun:
         return found
 
     def may_grow(self, name: str) -> bool:
-        """Whether an array of `arrays` may have another length later in the run than at its start."""
+        """Whether an array of `arrays` may change its length during the run."""
         return False
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
-        """Take the state of the run that gave these `arrays`: at a frame, or within one if it was `cut_short`."""
+        """Set the state to that of the run with these `arrays`: at a frame, or within a frame if it was `cut_short`."""
         for name, array in self.arrays().items():
             np.copyto(array, arrays[name], casting="no")
         self._cut_short = cut_short
         if self._tally is not None:
             self._tally.restore(arrays)
 
-    # --- What is observed --------------------------------------------------------------------------------
+    # --- Observation -------------------------------------------------------------------------------------
 
     def observe(self) -> None:
         """Observe the start."""
@@ -276,39 +276,39 @@ class BaseRun:
     def _observe(self, moment: float) -> None:
         """Observe a frame."""
         self._tier.kernel(observables.observe)(*self._observing())
-        # Rates are those of a frame, not of a piece of one.
+        # Rates are those of a frame, not of a piece of a frame.
         if self._ball_numbers is not None and moment == self._end:
             idle = self.state.gone() | self._waiting() | self._has_left()
             kinetic = self._summed()["kinetic_energy"] - self._kinetic_of(idle)
             self._ball_numbers.frame(self._seen_state(), moment, kinetic)
 
     def _observing(self, drawn: NDArray[Any] | None = None) -> tuple[Any, ...]:
-        """Arguments of `observe`: of all chunks, or of the draws of a thread."""
+        """Return the arguments of `observe`, for all chunks, or for the draws of a thread."""
         drawn = np.arange(len(self._partial)) if drawn is None else drawn
         return self._law, self._walls, self._gravity, self._seen_state(), drawn, self._size, self._partial
 
     def _waiting(self) -> Any:
-        """(N,) whether a wall holds each ball: it does not move, and its velocity is that with which it will leave."""
+        """Whether a wall holds each ball (N,): a held ball does not move, and has the velocity with which it leaves."""
         return False
 
     def _kinetic_of(self, some: NDArray[np.bool_]) -> float:
-        """The kinetic energy of some of the particles [J]."""
+        """Return the kinetic energy of some of the particles [J]."""
         state = self.state
         return 0.5 * float((state.mass[some] * (state.velocity[:, some] ** 2).sum(axis=0)).sum())
 
     def _summed(self) -> dict[str, Any]:
-        """The observables that are sums over particles."""
+        """Return the observables that are sums over particles."""
         return observables.summary(self._partial, self._seen_state(), self._owners, bool(self._kinds), self._parts)
 
     def _summary(self) -> dict[str, Any]:
-        """The observables that are sums over particles, contacts and walls."""
+        """Return the observables that are sums over particles, contacts and walls."""
         seen = self._with_stored(self._summed())
         seen = seen if self._ball_numbers is None else self._ball_numbers.added(seen, self._seen_state())
         seen = seen if self._feed is None else seen | self._feed.observed()
         return seen if self._observed is None else with_walls(seen, self._observed)
 
     def seen(self) -> dict[str, Any]:
-        """The observables of the last frame."""
+        """Return the observables of the last frame."""
         seen = self._summary()
         if (scale := self._scale_of(seen)) is not None:
             seen["energy_error"] = abs(balance(seen) - float(self._start[0])) / scale if scale > 0.0 else 0.0
@@ -318,11 +318,11 @@ class BaseRun:
         return seen
 
     def _escaped(self) -> int:
-        """The number of particles that have left an open scene through no opening."""
+        """Return the number of particles that have left an open scene, but not through an opening."""
         return int((self._has_left() & ~self.state.gone()).sum())
 
     def _has_left(self) -> NDArray[np.bool_]:
-        """(N,) whether each is far away, or beyond an open face and flies in its direction, as points are counted."""
+        """Whether each ball (N,) is far away, or beyond an open face and flies in its direction, as for points."""
         state = self.state
         if self._far == math.inf:
             return np.zeros(state.mass.size, np.bool_)
@@ -332,11 +332,11 @@ class BaseRun:
         return left
 
     def _seen_state(self) -> State:
-        """The state of the particles that are there at the last frame."""
+        """Return the state of the particles in the scene at the last frame."""
         return self.state if self._feed is None else self._feed.seen(self.state)
 
     def require_admissible(self, seen: dict[str, Any], moment: float) -> None:
-        """Raise a RunError that names the first particle that is not finite, or is outside rigid walls."""
+        """Raise a `RunError` with the first particle that is not finite, or is outside rigid walls."""
         scene, state = self._scene, self._seen_state()
         lost = np.zeros(state.mass.size, np.bool_)
         if state.radius is not None:
@@ -348,23 +348,23 @@ class BaseRun:
     # --- Calls of kernels --------------------------------------------------------------------------------
 
     def _called(self, kernel: Any, calls: Iterable[tuple[Any, ...]], latest: float) -> list[Any]:
-        """The results of a kernel for each of these tuples of arguments, each in a thread; halted at `latest`."""
+        """Call a kernel for each tuple of arguments in a thread, halted at `latest`; return the results."""
         chosen = self._tier.kernel(kernel)
         shares = [self._pool.submit(chosen, *arguments) for arguments in calls]
         return [result_of(share, latest, self.halt) for share in shares]
 
     def _call(self, kernel: Any, *arguments: Any, latest: float = math.inf) -> Any:
-        """The result of a kernel in one thread."""
+        """Call a kernel in one thread; return its result."""
         return self._called(kernel, [arguments], latest)[0]
 
     def _in_parts(self, kernel: Any, *arguments: Any, first: int = 0, last: int, latest: float = math.inf) -> None:
-        """Call a kernel for the numbers from `first` to before `last`, a part of them in each thread."""
+        """Call a kernel for the numbers from `first` to before `last`, a part in each thread."""
         threads = 1 if self._tier.is_plain or self.state.mass.size < _FEW else self._threads
         ends = np.linspace(first, last, threads + 1).astype(int).tolist()
         self._called(kernel, [(*arguments, *part) for part in itertools.pairwise(ends)], latest)
 
     def _in_chunks(self, kernel: Any, *arguments: Any) -> None:
-        """Call a kernel for all particles, some at a time; compiled from where the time for plain Python ends."""
+        """Call a kernel for all particles, some at a time, compiled after the time for plain Python."""
         began, first, n = time.perf_counter(), 0, self.state.mass.size
         while first < n:
             last = min(first + self._at_once(), n)
@@ -375,35 +375,35 @@ class BaseRun:
                 self._tier.end_plain(seconds)
 
     def _at_once(self) -> int:
-        """How many particles a kernel takes between two looks at the halt."""
+        """Return the number of particles of a kernel between two looks at the halt."""
         return _AT_ONCE_PLAIN if self._tier.is_plain else _AT_ONCE
 
     def _watchers(self, counters: Any) -> Watchers:
-        """The log, the tally and the counters of the calling thread."""
+        """Return the log, the tally and the counters of the calling thread."""
         log = None if self._impacts is None else self._impacts.example
         return Watchers(log, None if self._tally is None else self._tally.counts(), counters)
 
     def _open_page(self, end: float) -> ThreadLog | None:
-        """The log of the calling thread, for the frame that ends at a time [s]; None in a run without a log."""
+        """Return the log of the calling thread, for the frame that ends at a time [s]; None in a run without a log."""
         return None if self._impacts is None else ThreadLog(self._impacts, end)
 
     def is_plain(self) -> bool:
-        """Whether its kernels are run in plain Python at first."""
+        """Whether the kernels run in plain Python."""
         return self._tier.is_plain
 
     def _choose_tier(self) -> None:
-        """Take the tier of the next calls."""
+        """Choose the tier of the next calls."""
         self._tier.choose(self.calls())
 
     def _limit(self, latest: float) -> float:
-        """When kernels return at the latest [s of time.monotonic]: sooner where the time for plain Python ends."""
+        """Return the latest time for kernels to return [s of time.monotonic], that of plain Python included."""
         if self._tier.is_plain and self._tier.remaining <= 0.0:
             self._choose_tier()
         return min(latest, time.monotonic() + self._tier.remaining) if self._tier.is_plain else latest
 
 
 def arrays_of(found: Mapping[str, Any]) -> Arrays:
-    """The arrays among these, for `BaseRun.arrays`: None is left out, and those of a named tuple have its name first.
+    """Return the arrays of a checkpoint, without None; arrays of a named tuple have its name first.
 
     >>> from swarm.state import Absorbed
     >>> absorbed = Absorbed(np.zeros(1), np.zeros(1, np.int32))
@@ -420,10 +420,10 @@ def arrays_of(found: Mapping[str, Any]) -> Arrays:
 
 
 def result_of(share: "Future[T]", latest: float, halt: Callable[[], None]) -> T:
-    """The result of a thread, which is halted at `latest` [s of time.monotonic].
+    """Return the result of a thread, which is halted at `latest` [s of time.monotonic].
 
-    It waits many short times: Python handles a signal between two of them. One that came just before a long wait, or to
-    another thread, would be handled only at the end of that.
+    This waits many short times, and Python handles signals between two of them. A signal just before a long wait, or to
+    another thread, would be handled only at the end of the wait.
     """
     while True:
         try:

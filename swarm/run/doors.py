@@ -1,4 +1,4 @@
-"""The run of a scene in which walls come and go, or openings open and shut: its frames are cut at these instants."""
+"""The run of a scene with walls that become absent, or openings that shut: frames are cut at these instants."""
 
 import bisect
 import itertools
@@ -23,11 +23,11 @@ from .failures import sentence_of_coming
 
 
 class DoorRun(Run):
-    """The run of particles, piece by piece of each frame: from one instant to the next nothing comes or goes."""
+    """The run of particles by pieces of each frame: between two instants no wall becomes absent or present."""
 
-    # What contacts stored before the instant that has come, per mass [J/kg].
+    # The energy that contacts stored before the current instant, per mass [J/kg].
     _stored_before: NDArray[np.float64] | None = None
-    # Which rows have a wall that goes, or opens, then, and the walls before.
+    # Whether each row has a wall that becomes absent, or opens, at this instant; and the walls before.
     _left: NDArray[np.bool_]
     _walls_before: Any
 
@@ -47,10 +47,10 @@ class DoorRun(Run):
             self._walls, self._faces = self._compiled.walls(moment), self._scene.open_faces(moment)
         self.state = self.state._replace(openings=self._compiled.openings(moment))
 
-    # --- What soft contacts store ------------------------------------------------------------------------
+    # --- Energy of soft contacts -------------------------------------------------------------------------
 
     def _stored(self, remaining: float) -> NDArray[np.float64]:
-        """What the contacts of each particle store with so much left of a piece [s], per mass [J/kg]."""
+        """Return the stored energy of each particle with `remaining` [s] of a piece left, per mass [J/kg]."""
         found = np.zeros(self.state.mass.size)
         self._tier.kernel(observables.store)(self._law, self._walls, remaining, self.state, found)
         return found
@@ -61,13 +61,13 @@ class DoorRun(Run):
             yield observables.store, (self._law, self._walls, 0.0, self.state, np.zeros(self.state.mass.size))
 
     def _lose(self, lost: NDArray[np.float64]) -> None:
-        """Take energies from the particles, per mass [J/kg], which were stored with walls that went."""
+        """Take energies `lost` from the particles, per mass [J/kg], which were stored with walls that became absent."""
         self.state.energy[:] -= lost
         self._cut_contacts(lost > 0.0)
         self.state.dissipated[:] += lost * self.state.mass
 
     def _cut_contacts(self, loses: NDArray[np.bool_]) -> None:
-        """End the contacts of these particles with walls that went, or opened: each has a row, and no law acts."""
+        """End the contacts of particles with walls that became absent, or opened: each has a row, and no law acts."""
         state, pressed, rubbed = self.state, self.state.pressed, self.state.rubbed
         if pressed is None or rubbed is None:
             return
@@ -90,7 +90,7 @@ class DoorRun(Run):
         if k == len(instants) or instants[k] != instant:
             return
         if (came := comers(self._scene, instant)).any():
-            # Particles from sources are born later, where no wall is at that time.
+            # Unborn particles do not count: they are born where no wall is at that time.
             self._present.reach(instant)
             state, deepest = self.state, OUTSIDE * self._scene.finite_size()
             require_free(self._scene, state, came, deepest, instant, self._first, self._present.count)
@@ -110,8 +110,8 @@ class DoorRun(Run):
             _wake(contacts, contacts.phase == ARRIVED)
 
     def _let_go(self, contacts: Contacts, gone: NDArray[np.bool_]) -> None:
-        """Let particles that slide or rest on the walls of the pieces in `gone` fly: these walls left the scene."""
-        # Number -1 is no wall.
+        """Let particles that slide or rest on walls of the pieces in `gone` fly, as these walls are absent."""
+        # The number -1 stands for no wall.
         numbering = self._compiled.numbering
         walls = np.append(gone[numbering.pieces_of_walls], False)
         held = walls[contacts.walls.astype(np.int64)].any(axis=0)
@@ -126,12 +126,12 @@ class DoorRun(Run):
 
 
 def _some_come(surfaces: Iterable[Surface], last: float, instant: float) -> bool:
-    """Whether one that was not there at the last time [s] is there at an instant [s]."""
+    """Whether a surface that was absent at the time `last` [s] is present at an instant [s]."""
     return any(one.is_there(instant) and not one.is_there(last) for one in surfaces)
 
 
 def comers(scene: Scene, instant: float) -> NDArray[np.bool_]:
-    """Which surfaces have walls that come at an instant [s]."""
+    """Return whether each surface has walls that become present at an instant [s], (surfaces,)."""
     last, came = _before(scene, instant), np.zeros(len(scene.surfaces), np.bool_)
     for i, piece in scene.pieces.owned():
         came[i] |= piece.is_there(instant) and not piece.is_there(last)
@@ -142,7 +142,7 @@ def require_free(
     scene: Scene, state: State, came: NDArray[np.bool_], deepest: float, instant: float, first: int = 0,
     count: int | None = None,
 ) -> None:  # fmt: skip
-    """Raise a RunError where one of the first `count` particles is inside a surface that comes at an instant [s]."""
+    """Raise a `RunError` if one of the first `count` particles is inside a surface that comes at an instant [s]."""
     distances = scene.distances_outside(state.position, instant, state.radius)
     distances[~came] = -math.inf
     distances[:, state.gone()] = -math.inf
@@ -157,13 +157,13 @@ def require_free(
 
 
 def _before(scene: Scene, instant: float) -> float:
-    """A time before an instant and after the one before it [s]."""
+    """Return a time before an instant and after the instant before it [s]."""
     k = bisect.bisect_left(scene.instants, instant)
     return 0.5 * ((scene.instants[k - 1] if k > 0 else 0.0) + instant)
 
 
 def _wake(contacts: Contacts, rests: NDArray[np.bool_]) -> None:
-    """Let what rests find out whether it still does: an opening may be where it is."""
+    """Let particles at rest be looked at again, as an opening may be where they are."""
     first, second = contacts.walls[:, rests] >= 0.0
     contacts.load[:, rests] = 0.0
     contacts.phase[rests] = np.where(second, EDGE, np.where(first, HELD, CAREFUL))

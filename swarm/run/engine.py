@@ -1,4 +1,4 @@
-"""The run of particles that are independent of one another: the only caller of their kernels."""
+"""The run of particles that are independent of one another, the only caller of their kernels."""
 
 import functools
 import math
@@ -34,16 +34,16 @@ from .tally import UNWATCHED, Watched
 from .tiers import Tier
 from .turns import End, Turns, left_behind
 
-# The caller's thread computes too where a frame is shorter than this [s]; in longer ones, and in the first, it stays
+# The length of a frame [s] up to which the caller's thread computes too; in longer frames, and in the first, it stays
 # free to handle an interrupt.
 _SHORT_FRAME = 0.05
-# The caller's thread alone does frames of less work than this [s]: waking another takes some 0.1 ms.
+# The work of a frame [s] up to which the caller's thread works alone, as waking another takes some 0.1 ms.
 _LITTLE_WORK = 2e-4
-# A frame counts as slow to write above this part of the work in it.
+# A frame is slow to write if writing takes more than this part of the work in it.
 _MUCH_WRITING = 1.0 / 3.0
-# The phases other than flight, each of which has a kernel, and the walls that hold a particle that slides in it.
+# The phases other than flight, each with its own kernel, and the walls that hold a particle that slides in it.
 _KINDS = {EVENT: None, CAREFUL: None, HELD: One(0.0), EDGE: Two(0.0, 0.0)}
-# In a frame in which particles slide a thread takes its share in so many parts, one after the other.
+# The parts in which a thread takes its share of a frame in which particles slide.
 _PARTS = 4
 _DONE: End = (int(Status.DONE), 0, None)
 
@@ -51,8 +51,8 @@ _DONE: End = (int(Status.DONE), 0, None)
 class Run(BaseRun):
     """The run of points; the state holds the arrays of the particles, not copies."""
 
-    # Seconds of work in the last frame per unit of its span. Infinite where unknown: then another thread than the
-    # caller's compiles what is missing.
+    # The work in the last frame per unit of its span [s]. It is infinite if unknown, so that another thread than the
+    # caller's compiles missing kernels.
     _pace = math.inf
 
     def __init__(
@@ -62,7 +62,7 @@ class Run(BaseRun):
         n, scene = len(particles), compiled.scene
         self._numbers, self._law = method.numbers(scene), method.law()
         if watched.log is not None and self._numbers.laws_at_ends is None and self._law is not None:
-            # Impacts are logged where contacts end, also where walls have no laws.
+            # Impacts are logged at the ends of contacts, also without laws.
             self._numbers = self._numbers._replace(ends=NONE)
         self._walls = compiled.walls()
         takes_time = self._numbers.contacts_take_time
@@ -74,7 +74,7 @@ class Run(BaseRun):
         self.state = with_counters(self.state, self._counters, counters, scene)
         observables.start_energies(compiled, self._law, self.state)
         self._faces = scene.open_faces()
-        # A block is whole chunks, so that each thread observes the particles that it has advanced.
+        # A block consists of whole chunks, so that each thread observes the particles that it has advanced.
         self._size = observables.CHUNK * max(1, round(min(block_size or 0, n) / observables.CHUNK))
         self._present = Presence(particles.births, self.state, self._size)
         self._ticket = np.zeros(1, np.int64)
@@ -82,7 +82,7 @@ class Run(BaseRun):
         self._seed = seeding.signed()
         self._kinds: set[int] = set()  # the phases other than flight that particles have been in
         self._halted = lanes.none_halted(self._booked)
-        self._lanes: list[lanes.Lanes] = []  # those that no thread uses now
+        self._lanes: list[lanes.Lanes] = []  # the lanes that no thread uses now
         self._hard = None if method.may_slide() or method.seldom_hard(scene) else blocks.Hard(blocks.MOST_HITS)
         self._threads = min(threads, len(self._present.order))
         self._choose_tier()
@@ -114,7 +114,7 @@ class Run(BaseRun):
 
     def _goes_on(self, status: int, item: int, seconds: float) -> bool:
         if status == Status.HARD_CONTACT:
-            # Go on with the kernel of this phase, or, where no contacts last, with the kernel of hard contacts.
+            # Go on with the kernel of this phase or, if no contacts last, with the kernel of hard contacts.
             if self.state.contacts is not None:
                 self._kinds.add(item)
             else:
@@ -131,9 +131,9 @@ class Run(BaseRun):
         return failures.of_frame(self._compiled, self._method, self.state, (status, item), moment, seeding)
 
     def _share(self, span: float) -> End:
-        """Advance and observe the particles that one thread draws; returns how that ended."""
+        """Advance and observe the particles that one thread draws; return the end of this."""
         draws = self._drawing()
-        # Lanes are kept: to make them takes as long as all else that Python does in a small frame.
+        # Lanes are kept, as to make them takes as long as all other Python code of a small frame.
         try:
             mine = self._lanes.pop()
         except IndexError:
@@ -142,7 +142,7 @@ class Run(BaseRun):
         if not self._kinds:
             end = self._part(span, draws, mine, page)
         else:
-            # In parts: otherwise the first thread would draw all particles before the other threads begin.
+            # In parts, as otherwise the first thread would draw all particles before the other threads begin.
             some, end = max(1, len(self._present.order) // (_PARTS * self._threads)), _DONE
             while end[0] == Status.DONE and (order := take(draws, some)).size:
                 end = self._part(span, draws.again(order), mine, page)
@@ -152,7 +152,7 @@ class Run(BaseRun):
         return end
 
     def _part(self, span: float, draws: Draws, mine: lanes.Lanes, page: ThreadLog | None) -> End:
-        """Advance and observe a part of the particles: in flight, then at walls and along them, and again."""
+        """Advance and observe a part of the particles: in flight, then at walls and along them, in turns."""
         share = self._shared(span, draws)
         status, particle, drawn = self._kernel(blocks.advance_block, page)(*self._flying(share, mine))
         turns = Turns(self._phase, self.state.contacts, draws, drawn)
@@ -181,7 +181,7 @@ class Run(BaseRun):
         return status, 0, lanes.Halted(mine.particle[:live].copy(), mine.left_behind[:, :live].copy())
 
     def _kernel(self, kernel: Any, page: ThreadLog | None) -> Any:
-        """A kernel of this tier that advances particles, and writes its impacts to a page of the log."""
+        """Return a kernel of this tier that advances particles, and writes their impacts to a page of the log."""
         chosen = self._tier.kernel(kernel)
         return chosen if page is None else functools.partial(page.call, chosen)
 
@@ -198,7 +198,7 @@ class Run(BaseRun):
         """Do nothing: each thread has observed the particles that it has advanced."""
 
     def _reach(self, moment: float) -> None:
-        """Set the walls, and the particles that are there, for the frame that ends at a moment [s]."""
+        """Set the walls, and the particles in the scene, for the frame that ends at a moment [s]."""
         self._present.reach(moment)
         if self._scene.moves():
             self._walls, self._faces = self._compiled.walls(self._moment), self._scene.open_faces(self._moment)
@@ -217,7 +217,7 @@ class Run(BaseRun):
         return self._first + int(self._halted.particle[last]), self._halted.places()[:, last].tolist()
 
     def _hands(self, span: float, writing: float) -> tuple[int, bool]:
-        """(the number of threads of the pool that advance a frame, whether the caller's thread does too)."""
+        """Return the number of threads of the pool that advance a frame, and whether the caller's thread does too."""
         work = self._pace * span if span > 0.0 else 0.0
         helps = work < _SHORT_FRAME * self._threads
         # Plain Python runs in one thread at a time. A thread that writes for as long as another computes needs a
@@ -228,7 +228,7 @@ class Run(BaseRun):
     # --- Arguments of kernels ----------------------------------------------------------------------------
 
     def _drawing(self) -> Draws:
-        """The draws of one thread."""
+        """Return the draws of one thread."""
         order = self._present.order
         return Draws(self._ticket, order, self._size, np.empty(len(order), np.int64))
 
@@ -243,7 +243,7 @@ class Run(BaseRun):
         return made if counters is None else made._replace(began=table.table(counters.rows()))
 
     def _shared(self, span: float, draws: Draws) -> Share:
-        """The share of a thread: its draws and counts, and the arrays of all particles."""
+        """Return the share of a thread: its draws and counts, and the arrays of all particles."""
         return Share(
             self._present.flying(self.state), self._present.of(self._phase), np.zeros(PHASES, np.int64), self._halted,
             draws, self._watch.passes, span,
@@ -251,18 +251,18 @@ class Run(BaseRun):
         )  # fmt: skip
 
     def _flying(self, share: Share, mine: lanes.Lanes) -> tuple[Any, ...]:
-        """Arguments of `advance_block`."""
+        """Return the arguments of `advance_block`."""
         return self._numbers, self._walls, self._gravity, self._hard, share, mine
 
     def _lasting(self, phase: int, share: Share) -> tuple[Any, tuple[Any, ...]]:
-        """The kernel that advances particles in this phase, which is not flight, and its arguments."""
+        """Return the kernel that advances particles in a phase other than flight, and its arguments."""
         common = self._numbers, self._walls, self._gravity, share
         if _KINDS[phase] is None:
             return contact_events.meet_block if phase == EVENT else careful.careful_block, common
         return slide.slide_block, (_KINDS[phase], *common, sliding.empty_sliding(self.state))
 
     def _escaping(self) -> tuple[Any, ...]:
-        """Arguments of `count_escaped`."""
+        """Return the arguments of `count_escaped`."""
         return self._walls, self._gravity, self._far, self._faces, self._seen_state()
 
     def calls(self) -> Iterator[tuple[Any, tuple[Any, ...]]]:

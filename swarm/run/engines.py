@@ -1,7 +1,7 @@
-"""The engines of runs, and the choice of one. Only this module loads the engines of wings, by their names.
+"""The choice of the engine of a run. Only this module loads the engines of wings, by their names.
 
-A run of points that are independent of one another is an engine of the core, `Run`, or where walls come and go
-`DoorRun`. Bodies, balls and walls with a mass are wings: the core imports none of their modules.
+The engine of points that are independent of one another is `Run` of the core, or `DoorRun` where walls become absent.
+Bodies, balls and walls with a mass are wings: the core imports none of their modules.
 """
 
 import importlib
@@ -17,7 +17,7 @@ from .tally import UNWATCHED, Watched
 
 
 def wing(name: str) -> ModuleType:
-    """A module of a wing, by its name in the package.
+    """Return a module of a wing, by its name in the package.
 
     >>> wing("bodies.admission").__name__
     'swarm.bodies.admission'
@@ -26,7 +26,7 @@ def wing(name: str) -> ModuleType:
 
 
 def run_of(task: Task, watched: Watched = UNWATCHED) -> BaseRun:
-    """The engine of a run, at its start."""
+    """Return the engine of a run, at its start."""
     scene, particles, method, options = task.scene, task.particles, task.method, task.options
     what: Any = particles
     kind: Any = DoorRun if scene.has_doors() else Run

@@ -25,15 +25,15 @@ from .options import Task
 from .preflight import softness
 from .starting_state import Seeding
 
-# Of a particle that does not go on, where no user-defined function may be the cause.
+# The end of a sentence on a particle that does not go on, if no user-defined function may be the cause.
 _REPORT = "; if nothing is special about the place, it is an error of swarm: please report it with the scene"
 _CLOSED = ": walls that move have closed on it; end the run before"
-# Of the size: a ball this near to a wall touches it.
+# The distance from a wall at which a ball touches it, as a part of the size of the scene.
 _TOUCHES = 1e-9
-# What Numba says of the line that it could not compile, and of why.
+# The line that Numba could not compile, and the reason, in the text of its error.
 _PLACE = re.compile(r"at (\S+\.py) \((\d+)\)")
 _REASON = re.compile(r"TypingError: (?!Failed in nopython)(.+)")
-# What such code may use.
+# The constructs that compiled code may use.
 _ADVICE = (
     "compiled code may use numbers, `if`, `math` and swarm.kernel.vector (dot, norm, cross), no arrays or lists, "
     "and returns one kind of value from every branch, such as a velocity or a Leave"
@@ -43,7 +43,7 @@ _ADVICE = (
 def of_frame(
     compiled: CompiledScene, method: Method, state: State, end: tuple[Status, int], moment: float, seeding: Seeding
 ) -> str:
-    """The sentence about a frame that ended with this status and particle."""
+    """Return the sentence about a frame that ended with this status and particle."""
     (status, particle), first, scene = end, seeding.first, compiled.scene
     sentence = f"{_failed(moment)} {first + particle}: {status.sentence}"
     if status in (Status.STALLED, Status.TIMELESS):
@@ -67,7 +67,7 @@ def of_frame(
 def after(
     scene: Scene, before: float, particle: int, status: Status, place: Any, moment: float, radius: float | None = None
 ) -> str:
-    """The sentence about a frame after a time [s] that ended with this particle at its place at a moment [s].
+    """Return the sentence about the frame after the time `before` [s], which ended with a particle at a moment [s].
 
     A ball has a radius [m].
     """
@@ -81,7 +81,7 @@ def after(
 
 
 def _in_gap(scene: Scene, place: Any, moment: float, radius: float) -> str:
-    """The text about a ball that touches several walls at once; empty if it does not."""
+    """Return the text about a ball that touches several walls at once, empty if it does not."""
     outside = scene.distances_outside(np.array(place)[:, None], moment, np.array([radius]))[:, 0]
     touched = np.flatnonzero(outside >= -_TOUCHES * scene.finite_size()).tolist()
     if len(touched) < 2:
@@ -94,14 +94,14 @@ def _in_gap(scene: Scene, place: Any, moment: float, radius: float) -> str:
 
 
 def _cause(scene: Scene, status: Status) -> str:
-    """What else the frame may have failed for: a user-defined phi, or the engine itself."""
+    """Return the text about another possible cause of a failure: a user-defined phi, or the engine itself."""
     if text := unproved(scene):
         return f"; {text}"
     return _REPORT if status == Status.TIMELESS else ""
 
 
 def unproved(scene: Scene) -> str:
-    """A sentence about each user-defined surface, of which the engine assumes that phi is smooth; else empty."""
+    """Return a sentence about each user-defined surface with a phi that may not be smooth, else an empty text."""
     return "; ".join(text for i in range(len(scene.surfaces)) if (text := _unproved(scene, i)))
 
 
@@ -118,8 +118,8 @@ def _unproved(scene: Scene, i: int) -> str:
 def require_admissible(
     scene: Scene, state: State, lost: NDArray[np.bool_], seen: dict[str, Any], deepest: float, moment: float, first: int
 ) -> None:
-    """Raise a RunError where a state is not finite, deeper than `deepest` [m] in a wall, or a ball is `lost`."""
-    # Whatever is not finite spreads to the energy or, if it is a position, to the angular momentum.
+    """Raise a `RunError` if a state is not finite, or deeper than `deepest` [m] in a wall, or a ball is `lost`."""
+    # A number that is not finite spreads to the energy or, from a position, to the angular momentum.
     if not (math.isfinite(seen["total_energy"]) and np.isfinite(seen["angular_momentum"]).all()):
         position = state.position[:, : len(state.mass)]
         good = np.isfinite(position).all(axis=0) & np.isfinite(state.velocity[:, : len(state.mass)]).all(axis=0)
@@ -128,7 +128,7 @@ def require_admissible(
     if seen["max_penetration"] <= deepest and not lost.any():
         return
     distances = scene.distances_outside(position, moment, radius)
-    # Far out in an open scene the round-off of a position is that of its own size.
+    # Far out in an open scene the round-off of a position is relative to its magnitude.
     outside = distances > deepest / size * np.maximum(np.abs(position).max(axis=0), size)
     outside |= lost & (distances > (0.0 if radius is None else radius))
     outside &= ~state.gone()
@@ -142,7 +142,7 @@ def require_admissible(
 def sentence_of_coming(
     scene: Scene, state: State, found: tuple[int, int], depth: float, instant: float, first: int = 0
 ) -> str:
-    """The sentence about a particle that is so deep [m] in a wall that comes, `found` as (surface, particle)."""
+    """Return the sentence about a particle at a depth [m] in a wall that comes; `found` is (surface, particle)."""
     wall, particle = found
     place = shown(state.position[:, particle], 6)
     return (
@@ -152,7 +152,7 @@ def sentence_of_coming(
 
 
 def _place(scene: Scene, state: State, particle: int, moment: float) -> str:
-    """The place of a particle that does not go on, and the time, if its contacts may last: kernels leave that there."""
+    """Return the text of the place of a particle that does not go on, and of the time if its contacts may last."""
     remaining = 0.0 if state.contacts is None else state.contacts.remaining[particle]
     place, found = state.position[:, particle], moment - remaining
     wall = int(np.argmax(scene.distances_outside(place[:, None], found)[:, 0]))
@@ -161,7 +161,7 @@ def _place(scene: Scene, state: State, particle: int, moment: float) -> str:
 
 
 def _of_law(compiled: CompiledScene, state: State, particle: int, moment: float, seeding: Seeding) -> str:
-    """The text on the law that failed and on its arguments, which the kernel left in the state."""
+    """Return the text on the law that failed and on its arguments, which the kernel left in the state."""
     scene, contacts, laws = compiled.scene, state.contacts, compiled.laws
     assert contacts is not None
     assert laws is not None
@@ -191,7 +191,7 @@ def _named(scene: Scene, wall: int) -> str:
 
 @contextlib.contextmanager
 def explained(task: Task) -> Iterator[None]:
-    """Raise a SceneError that names user-defined code where the compiler refuses it."""
+    """Raise a `SceneError` with the name of user-defined code that the compiler refuses."""
     try:
         yield
     except Exception as error:
@@ -213,7 +213,7 @@ def _sentence(text: str, named: dict[str, type]) -> str:
 
 
 def _of_users(task: Task) -> Iterator[tuple[str, type]]:
-    """The laws, surfaces and methods of a run that are not of this package, by their names in the scene."""
+    """Yield the laws, surfaces and methods of a run that are not of this package, with their names in the scene."""
     candidates: list[tuple[str, Any]] = [("method", task.method)]
     for i, surface in enumerate(task.scene.surfaces):
         candidates.append((f"surfaces[{i}]", getattr(surface, "parameters", surface)))

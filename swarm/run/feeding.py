@@ -1,4 +1,4 @@
-"""The births of balls during a run: which are due, which find a free place, and which wait for one."""
+"""The births of balls during a run: when they are due, their free places, and their waits for a free place."""
 
 import math
 from collections.abc import Callable
@@ -15,14 +15,14 @@ from ..sources.places import changes
 from ..state import Floats, State
 from .preflight.softness import pace_of
 
-# The number of places that are tried for a birth at one time.
+# The most places that are tried for a birth at one time.
 _TRIES = 16
-# Balls that are born are at least this part of the sum of their radii apart, more than the round-off of it.
+# The least distance of balls at a birth, in sums of their radii: more than 1 by more than round-off.
 _APART = 1.0 + 1e-12
 
 
 class There(NamedTuple):
-    """The balls that are in the vessel at an instant: their centres and velocities (3, n), and their radii (n,)."""
+    """The balls in the vessel at an instant: their centres and velocities (3, n), and their radii (n,)."""
 
     position: Floats
     velocity: Floats
@@ -30,7 +30,7 @@ class There(NamedTuple):
 
 
 class Newborn(NamedTuple):
-    """The births of an instant: the numbers of the particles (n,), where they are and how fast, (3, n)."""
+    """The births at an instant: the numbers of the particles (n,), their positions and velocities (3, n)."""
 
     number: NDArray[np.int64]
     position: Floats
@@ -45,12 +45,12 @@ class Feed:
 
     Args:
         scene: the vessel.
-        particles: those of the start, followed by those that may come.
+        particles: the particles of the start, followed by those that may be born.
         seed: the seed of the run.
         is_clear: whether a place (3,) is clear of the walls that impacts move, for a radius [m] at a time [s].
 
     Attributes:
-        born_time: (N,) when each was born [s], NaN of those that are not.
+        born_time: (N,) the time of birth of each ball [s], NaN before it.
     """
 
     def __init__(
@@ -64,8 +64,8 @@ class Feed:
         n, sources = len(particles), births.sources
         self.born_time = np.where(births.source < 0, 0.0, np.nan)
         self._due = [np.flatnonzero(births.source == k) for k in range(sources)]
-        # For each source: the births that are over, the places that were tried, the births that found no free place at
-        # their time, and when the next one may be tried at the earliest [s].
+        # For each source: the births that are over, the places tried, the births without a free place at their time,
+        # and the earliest time of the next try [s].
         self._over, self._tried, self._blocked = np.zeros((3, sources), np.int64)
         self._earliest, self._counted = np.zeros(sources), np.full(sources, -1)
         self._energy = np.zeros(n)
@@ -73,13 +73,13 @@ class Feed:
         self._changing = [i for i, one in enumerate(scene.surfaces) if changes(one) and not one.reacts()]
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The arrays of a checkpoint, for `BaseRun.arrays`."""
+        """Return the arrays of a checkpoint, for `BaseRun.arrays`."""
         own = {"over": self._over, "tried": self._tried, "blocked": self._blocked, "earliest": self._earliest}
         own |= {"counted": self._counted, "energy": self._energy, "born_time": self.born_time}
         return {f"feed.{name}": array for name, array in own.items()}
 
     def observed(self) -> dict[str, Any]:
-        """The observables of sources."""
+        """Return the observables of sources."""
         source, sources = self._births.source, self._births.sources
         here = source[~np.isnan(self.born_time) & (source >= 0)]
         return {
@@ -88,14 +88,14 @@ class Feed:
         }  # fmt: skip
 
     def seen(self, state: State) -> State:
-        """The state of the balls that were born, in the order of their numbers."""
+        """Return the state of the balls that have been born, in the order of their numbers."""
         there = ~np.isnan(self.born_time)
         return state if there.all() else state.of(there)
 
     # --- Births ----------------------------------------------------------------------------------------------
 
     def next(self) -> float:
-        """When the next birth is due, or is to be tried again [s]; infinite if none is."""
+        """Return the time at which the next birth is due, or is to be tried again [s]; infinite without a birth."""
         return min((self._next_of(k) for k in range(self._births.sources)), default=math.inf)
 
     def _next_of(self, k: int) -> float:
@@ -104,7 +104,7 @@ class Feed:
         return max(float(self._births.time[self._due[k][self._over[k]]]), float(self._earliest[k]))
 
     def come(self, now: float, there: There, slack: float = 0.0) -> Newborn:
-        """The births at an instant [s], and those due within `slack` [s] after it, beside the balls that are there."""
+        """Return the births due until `slack` [s] after an instant `now` [s], beside the balls in the vessel."""
         made: list[tuple[int, Floats, Floats]] = []
         for k in range(self._births.sources):
             self._come_from(k, (now, now + slack), there, made)
@@ -114,7 +114,7 @@ class Feed:
     def _come_from(
         self, k: int, instant: tuple[float, float], there: There, made: list[tuple[int, Floats, Floats]]
     ) -> None:  # fmt: skip
-        """Add the births of a source to those that were `made` at this instant."""
+        """Add the births of a source to the births that were `made` at this instant."""
         waits, (now, latest) = self._births.balls[k].blocked == "wait", instant
         while self._next_of(k) <= latest:
             number = int(self._due[k][self._over[k]])
@@ -135,7 +135,7 @@ class Feed:
     def _free(
         self, k: int, number: int, now: float, there: There, made: list[tuple[int, Floats, Floats]]
     ) -> tuple[Floats, Floats] | None:
-        """A free place for a birth, with a velocity; None where none of a few is free."""
+        """Return a free place for a birth, with a velocity; None if all places tried are occupied."""
         mass, radius = self._particles.mass[number], self._particles.radius
         assert radius is not None
         there = self._beside(there, made)
@@ -153,14 +153,14 @@ class Feed:
         return None
 
     def _beside(self, there: There, made: list[tuple[int, Floats, Floats]]) -> There:
-        """The balls that are there, and those that were `made` at this instant, without the velocities of these."""
+        """Return the balls in the vessel with the balls `made` at this instant, without velocities of the latter."""
         radius = self._particles.radius
         assert radius is not None
         position = np.concatenate([there.position, *(r[:, None] for _n, r, _v in made)], axis=1)
         return there._replace(position=position, radius=np.append(there.radius, radius[[n for n, _r, _v in made]]))
 
     def _is_within(self, position: Floats, radius: float, now: float) -> bool:
-        """Whether a ball is within the walls that move, or come and go."""
+        """Whether a ball is within the walls that move, or become absent."""
         if not self._is_clear(position, radius, now):
             return False
         if not self._changing:
@@ -169,10 +169,10 @@ class Feed:
         return bool((depths[self._changing] <= 0.0).all())
 
     def _pause(self, k: int, number: int, there: There) -> float:
-        """How long to wait before a place is tried again [s]: the time in which a ball moves by a radius.
+        """The pause before a place is tried again [s]: the time in which a ball moves by a radius.
 
-        Its speed is the largest of three: that of the source, that after a fall by the radius, and the root mean square
-        of the speeds of the balls that are there. Where these are 0 it is a bound of that of the walls.
+        The speed is the largest of three: that of the source, that after a fall by the radius, and the root mean square
+        of the speeds of the balls in the vessel. If all are 0, it is a bound of the speeds of walls.
         """
         source, n = self._births.balls[k], there.radius.size
         radius = source.largest()
@@ -184,12 +184,12 @@ class Feed:
         return radius / pace if pace > 0.0 else math.inf
 
     def _next_due(self, now: float) -> float:
-        """When the next birth is due, or walls come or go [s]: where nothing moves, a place is tried again then."""
+        """The time of the next due birth, or change of walls [s]: where nothing moves, a place is tried again then."""
         times = np.append(self._births.time[self._births.source >= 0], self._scene.instants)
         return float(times[times > now].min(initial=math.inf))
 
     def _bear(self, number: int, position: Floats, velocity: Floats, now: float) -> None:
-        """Note a birth."""
+        """Book a birth."""
         particles, pull = self._particles, self._scene.gravity or (0.0, 0.0, 0.0)
         mass, spin = float(particles.mass[number]), particles.spin
         self.born_time[number] = now

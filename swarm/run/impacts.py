@@ -1,4 +1,4 @@
-"""The log of impacts of a run: kernels fill arrays, which the thread that writes frames writes too."""
+"""The log of impacts of a run: kernels fill arrays, and the thread that writes frames writes them."""
 
 import queue
 import threading
@@ -17,19 +17,19 @@ from ..lanes.watching.log import GOING, Log
 from ..lanes.watching.watchers import Watchers
 from .options import RunOptions, Task
 
-# The rows of one log, and the number of logs besides two for each thread: some are written while others are filled. A
+# The rows of a log, and the number of logs besides two for each thread, as some are written while others are filled. A
 # log takes 6 MB. With a quarter of the rows the writer takes twice as long for a row.
 _ROWS, _MORE = 1 << 16, 2
 # Rows up to this number are copied, so that their log can be filled again at once.
 _FEW = _ROWS // 16
-# A thread that waits for an empty log looks so often whether the run has ended [s].
+# The time between two looks, of a thread that waits for an empty log, at whether the run has ended [s].
 _GLANCE = 0.1
 
 Rows = dict[str, NDArray[Any]]
 
 
 class Impacts:
-    """The logs that the threads of a run fill; a log that is full is written while they fill others.
+    """The logs that the threads of a run fill; a full log is written while they fill others.
 
     Positions, velocities and impulses have the precision of the run; times are float64.
 
@@ -40,7 +40,7 @@ class Impacts:
         ends: frame -> the number of rows at its end, until the writer takes it.
         write: a function that adds rows to the file; the writer sets it.
         sums: a function that returns the checksums of the rows of the frame under way, as text; the writer sets it.
-        queue: a function that has the writer's thread call a function, in its turn among the frames.
+        queue: a function that lets the writer's thread call a function, in its turn among the frames.
     """
 
     def __init__(self, task: Task) -> None:
@@ -53,14 +53,14 @@ class Impacts:
         # Contacts with several walls may end in one step.
         most = min(LANES * len(compiled.numbering.surfaces_of_rows), _ROWS // 2) if takes_time else LANES
         self._lasts = self._meet and takes_time
-        # In a step of many grains many contacts may end.
+        # Many contacts may end in a step of many grains.
         rows = max(_ROWS, task.count) if self._lasts else _ROWS
-        # A flight may cross many counters; where particles depend on one another rows come one by one.
+        # A flight may cross many counters; rows come one by one if particles depend on one another.
         self._room = rows // 2 if options.counters or self._lasts else 1 if task.is_coupled else most
         self._spare: queue.SimpleQueue[Log] = queue.SimpleQueue()
         for _ in range(2 * options.thread_count() + _MORE):
             self._spare.put(self._made(rows))
-        # Of the types that kernels are called with.
+        # A log with the types that kernels take.
         self.example = self._made(0)
         self.begin, self.total, self.ends = 0.0, 0, dict[int, int]()
         self.write: Callable[[Rows], None] = lambda rows: None
@@ -84,14 +84,14 @@ class Impacts:
         )  # fmt: skip
 
     def columns(self) -> dict[str, Any]:
-        """Name -> array without rows, of each column."""
+        """Return name -> array without rows, for each column."""
         return _columns(self.example, 0)
 
     def empty(self, end: float) -> Log:
-        """An empty log of the frame that ends at a time [s]; it waits for one to be written.
+        """Return an empty log of the frame that ends at a time [s], after waiting until one has been written.
 
         Raises:
-            FileError: the logs before cannot be written.
+            FileError: earlier logs cannot be written.
         """
         while True:
             if self._problem is not None:
@@ -107,7 +107,7 @@ class Impacts:
             return log._replace(begin=self.begin, end=end)
 
     def hand_over(self, log: Log) -> None:
-        """Queue the rows of a log to be written, and the log to be filled again."""
+        """Queue the rows of a log for the writer, and the log for being filled again."""
         count = int(log.filled[0])
         rows, written = _columns(log, count), log if count > _FEW else None
         with self._counting:
@@ -130,12 +130,12 @@ class Impacts:
                 self._spare.put(log)
 
     def close(self) -> None:
-        """Let no thread wait for an empty log from now on."""
+        """Close the log: no thread waits for an empty log from now on."""
         self._over = True
 
 
 def log_of(task: Task) -> Impacts | None:
-    """The log of impacts of a run, if it has one."""
+    """Return the log of impacts of a run, or None."""
     return None if task.options.impacts is None else Impacts(task)
 
 
@@ -151,7 +151,7 @@ class ThreadLog:
         self.log = impacts.empty(end)
 
     def call(self, kernel: Any, *arguments: Any) -> tuple[int, int, int]:
-        """The result of a kernel; each time the log is full, it goes on with an empty one."""
+        """Call a kernel, again with an empty log each time the log is full; return its result."""
         while True:
             status, particle, drawn = kernel(*(self._with_log(one) for one in arguments))
             if status != Status.LOG_FULL:
@@ -164,11 +164,11 @@ class ThreadLog:
         return one._replace(watchers=self.watched_by(one.watchers)) if isinstance(one, Share) else one
 
     def watched_by(self, watchers: Watchers) -> Watchers:
-        """These watchers, with the log that is filled now."""
+        """Return these watchers with the log to be filled."""
         return watchers._replace(log=self.log)
 
     def turn(self) -> None:
-        """Hand over the rows so far, and go on with an empty log."""
+        """Hand over the rows so far, and begin an empty log."""
         self.close()
         self.log = self._impacts.empty(self._end)
 
@@ -184,14 +184,14 @@ class ThreadLog:
 
 
 def require_logged(n: int, options: RunOptions) -> None:
-    """Raise a `SceneError` where `impact_particles` has the number of a particle, or body, that does not exist."""
+    """Raise a `SceneError` if `impact_particles` has the number of a particle, or body, that does not exist."""
     numbers = options.impact_particles
     if isinstance(numbers, tuple) and numbers[-1] >= n:
         raise SceneError(f"impact_particles must be numbers of particles, from 0 to {n - 1}, got {numbers[-1]}")
 
 
 def chosen(particles: Any, n: int) -> NDArray[np.bool_] | None:
-    """Which of n particles have rows; None for all."""
+    """Return whether each of n particles has rows, (n,); None if all have."""
     if isinstance(particles, str):
         return None
     found = np.zeros(n, np.bool_)

@@ -1,4 +1,4 @@
-"""A run on this machine: the loop over frames, and their observers."""
+"""A run on this machine: the loop over frames, and its observers."""
 
 import contextlib
 import functools
@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     from ..files.background import Background
 
 _LOG = logging.getLogger("swarm")
-# Observables of so many frames are packed into arrays: as Python objects they take 3 kB a frame.
+# The frames after which observables are packed into arrays: as Python objects they take 3 kB a frame.
 _PACKED = 1024
 
 
 class Columns:
-    """The observables of all frames, each as an array with one entry a frame."""
+    """The observables of all frames, each as an array with one entry for each frame."""
 
     def __init__(self) -> None:
         self._frames: list[dict[str, Any]] = []
@@ -60,7 +60,7 @@ class Columns:
             self._frames = []
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The observables of all frames, in the order of a file: the time, then the others by their names."""
+        """Return the observables of all frames, in the order of a file: the time, then the others by their names."""
         self._pack()
         names = sorted(self._packed[0], key=lambda name: (name != "time", name)) if self._packed else []
         return {name: np.concatenate([part[name] for part in self._packed]) for name in names}
@@ -93,7 +93,7 @@ def carry_out_task(task: Task, session: Session) -> Result:
                 run.require_admissible(seen, moment)
                 read = functools.partial(getattr, run.state)
                 seen |= measures.of(number, moment, _snapshot_of(task, read, moment)) if measures else {}
-                # The file of a shard has its sums; the observables of the run are made of those of all shards.
+                # The file of a shard has its sums; the observables of the run are made of the sums of all shards.
                 if task.is_shard:
                     seen |= {} if task.is_coupled else {CHUNK_SUMS: run.chunk_sums()}
                 else:
@@ -112,9 +112,9 @@ def carry_out_task(task: Task, session: Session) -> Result:
 
 @contextlib.contextmanager
 def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display, Watched, Measures]]:
-    """A context with a run at its start or checkpoint, its `Background` writer or None, display, records and measures.
+    """Yield a run at its start or checkpoint, its `Background` writer or None, display, records and measures.
 
-    Until it ends, signals stop the run and its files are locked.
+    Until the context ends, signals stop the run and its files are locked.
     """
     recorder, watched = recorder_of(task), Watched(log_of(task), tally_of(task), task.options.counters)
     runs: list[BaseRun] = []
@@ -143,7 +143,7 @@ def _begun(task: Task, session: Session) -> Iterator[tuple[BaseRun, Any, Display
 
 
 def _why_slow(scene: Scene) -> str:
-    """Why kernels of this scene may take long to compile, in a sentence; "" for fewer than two such walls."""
+    """Return the sentence on why kernels of a scene may take long to compile; "" for fewer than two such walls."""
     rough = sum(one.motion is not None and bool(one.friction) for one in scene.surfaces)
     if rough < 2:
         return ""
@@ -151,7 +151,7 @@ def _why_slow(scene: Scene) -> str:
 
 
 def _measures_of(task: Task, session: Session) -> Measures:
-    """The user-defined observables of a run, with their shapes from the start, or from a trajectory that goes on."""
+    """Return the user-defined observables of a run, with shapes from the start, or from a resumed trajectory."""
     made = Measures(task.options.observables, task.options.until)
     if made and session.first == 0:
         made.begin(0, 0.0, start_of(task))
@@ -164,7 +164,7 @@ def _measures_of(task: Task, session: Session) -> Measures:
 
 
 def start_of(task: Task) -> Snapshot:
-    """The particles of a run at its start."""
+    """Return the particles of a run at its start."""
     arrays: dict[str, Any] = {name: getattr(task.particles, name) for name in ARRAYS}
     arrays["impacts"] = np.zeros(len(task.particles), np.int64)
     arrays["collisions"] = None if task.particles.radius is None else np.zeros(len(task.particles), np.int64)
@@ -172,7 +172,7 @@ def start_of(task: Task) -> Snapshot:
 
 
 def _snapshot_of(task: Task, read: Read, moment: float) -> Snapshot:
-    """The particles of a run that are there at a moment [s]."""
+    """Return the particles of a run in the scene at a moment [s]."""
     scene, births = task.scene, task.particles.births
     born = read("born_time")
     there: Any = None if births is None else births.there(moment)
@@ -183,7 +183,7 @@ def _snapshot_of(task: Task, read: Read, moment: float) -> Snapshot:
 def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> Result:
     state, particles = run.state, task.particles
     born = birth_times(particles) if state.born_time is None else state.born_time
-    # Balls that were never born have no place.
+    # Balls that were not born have no place.
     particles.position[:, np.isnan(born)] = particles.velocity[:, np.isnan(born)] = np.nan
     is_whole, never = session.first == 0 or task.is_shard, np.full(len(particles), np.nan)
     return Result(
@@ -205,7 +205,7 @@ def _end(task: Task, session: Session, run: BaseRun, kept: Columns) -> Result:
 
 
 def birth_times(particles: Particles) -> Floats:
-    """When each of the particles comes [s], 0 of those of the start."""
+    """Return the birth time of each particle [s], 0 for particles of the start."""
     return np.zeros(len(particles)) if particles.births is None else particles.births.time
 
 
@@ -215,12 +215,12 @@ def warn_open() -> None:
 
 
 def _meanwhile(session: Session, writer: "Background | None", show: Display) -> tuple[float, float]:
-    """The last two arguments of `BaseRun.advance`: the time to write a frame [s], and the latest time to return."""
+    """Return the last arguments of `BaseRun.advance`: the time to write a frame [s], and the latest time to return."""
     return writer.seconds if writer else 0.0, min(session.latest(writer), time.monotonic() + min(show.every, LOOK))
 
 
 def read_back(trajectory: Path) -> dict[str, NDArray[Any]]:
-    """The observables of all frames of all sessions."""
+    """Return the observables of all frames of all sessions."""
     from ..files.trajectory import load
 
     with load(trajectory) as written:

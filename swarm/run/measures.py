@@ -15,14 +15,14 @@ from ..common.snapshot import Snapshot
 from ..errors import RunError, SceneError
 
 Function = Callable[[Frame], Any]
-# What a file has of an observable are numbers, vectors and matrices, and tables of these.
+# The most axes of an observable: files have numbers, vectors, matrices, and tables of these.
 _MOST_AXES = 3
-# The end of the name of a column of a table, that of a part of an observable.
+# The end of the name of a column of a table, which names a part of an observable.
 _COLUMN = re.compile("(_([0-9]+|[wxyz]))+$")
 
 
 class _NotYet(dict[str, Any]):
-    """The observables of a frame for which functions are called."""
+    """The observables of a frame while functions are called for it: none of them is available yet."""
 
     def __missing__(self, name: str) -> Any:
         raise KeyError(
@@ -31,10 +31,10 @@ class _NotYet(dict[str, Any]):
 
 
 def checked(argument: str, given: Any) -> dict[str, Function]:
-    """The argument `observables` of a run: functions by their names.
+    """Return the argument `observables` of a run, checked: functions by their names.
 
     Raises:
-        SceneError: it is no dict of functions, or a name cannot be that of an observable.
+        SceneError: the argument is no dict of functions, or a name cannot be that of an observable.
     """
     if given is None:
         return {}
@@ -52,10 +52,10 @@ def checked(argument: str, given: Any) -> dict[str, Function]:
 
 
 class Measures:
-    """The functions of a run, and the shapes of what they return.
+    """The functions of a run, and the shapes of their values.
 
     Args:
-        functions: by their names, checked.
+        functions: the functions by their names, checked.
         until: the end of the run [s].
     """
 
@@ -68,26 +68,26 @@ class Measures:
         return bool(self._functions)
 
     def expect(self, shapes: Mapping[str, tuple[int, ...]]) -> None:
-        """Take the shapes of the frames before, of a run that goes on."""
+        """Take the shapes of earlier frames of a resumed run."""
         self._shapes |= {name: shapes[name] for name in self._functions if name in shapes}
 
     def size(self) -> int:
-        """Bytes of what is known of a frame."""
+        """Return the bytes of the values of a frame, as far as their shapes are known."""
         return sum(8 * int(np.prod(shape)) for shape in self._shapes.values())
 
     def begin(self, number: int, time: float, arrays: Snapshot) -> None:
-        """Try all functions with a frame before kernels are compiled; what they return is that of this frame.
+        """Call all functions for a frame before kernels are compiled, and keep their values for this frame.
 
         Raises:
-            SceneError: one fails.
+            SceneError: a function fails.
         """
         self._first = number, self._called(number, time, arrays, SceneError)
 
     def of(self, number: int, time: float, arrays: Snapshot) -> dict[str, Any]:
-        """What the functions return for a frame.
+        """Return the values of the functions for a frame.
 
         Raises:
-            RunError: one fails.
+            RunError: a function fails.
         """
         known, seen = self._first
         return seen.copy() if known == number else self._called(number, time, arrays, RunError)
@@ -115,12 +115,12 @@ class Measures:
         return seen
 
 
-# Of a run that has none.
+# The measures of a run without user-defined observables.
 NONE = Measures({}, 0.0)
 
 
 def _numbers(given: Any) -> NDArray[np.float64]:
-    """What a function has returned, as float64 of its own; a ValueError says what was expected and came."""
+    """Return the value of a function as a float64 copy; a ValueError says what was expected and what came."""
     expected = "a number or an array of numbers"
     if is_masked(given):
         raise ValueError(f"{expected}, got a masked array; fill it")
@@ -137,6 +137,6 @@ def _numbers(given: Any) -> NDArray[np.float64]:
 
 
 def _place_of(error: Exception) -> str:
-    """The file and the line in which an error was raised, if that is known."""
+    """The file and the line in which an error was raised, if they are known."""
     calls = [call for call in traceback.extract_tb(error.__traceback__) if call.filename != __file__]
     return f" ({calls[-1].filename}, line {calls[-1].lineno})" if calls else ""

@@ -23,7 +23,7 @@ from .preflight.knows import Asked, require_supported
 from .preflight.starts import require_inside
 from .starting_state import Seeding
 
-# The search for a hit ends after so many parts of a flight, each of which surely meets no wall.
+# The most parts of a flight, each of which surely meets no wall, in the search for a hit.
 _PARTS = 1000
 
 
@@ -31,10 +31,10 @@ class NextImpact(NamedTuple):
     """The next impact of one point.
 
     Attributes:
-        time: of the flight to it [s].
-        position: where it is (3,) [m].
-        velocity: after it (3,) [m/s].
-        velocity_before: before it (3,) [m/s].
+        time: the time of the flight to the impact [s].
+        position: the place of the impact (3,) [m].
+        velocity: the velocity after it (3,) [m/s].
+        velocity_before: the velocity before it (3,) [m/s].
         surface: the number of the surface in the scene.
     """
 
@@ -46,23 +46,23 @@ class NextImpact(NamedTuple):
 
 
 def bounce(scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float = 1.0, seed: int = 0) -> NextImpact:
-    """The next impact of one point, as `Impact` makes it; repeat it to walk from impact to impact.
+    """Return the next impact of one point by `Impact`; repeat the call to walk from impact to impact.
 
     Args:
         scene: walls at rest, without openings and without a period, and gravity.
-        position: three numbers [m]; on a wall, as after an impact, or inside.
+        position: three numbers [m]; inside, or on a wall, as after an impact.
         velocity: three numbers [m/s].
-        mass: of the point [kg], above 0; laws of walls and temperatures depend on it.
-        seed: seed of the random numbers of walls, from 0 to 2**64 - 1. Give another one for each impact.
+        mass: the mass of the point [kg], above 0; laws of walls and temperatures depend on it.
+        seed: seed of the random numbers of walls, from 0 to 2**64 - 1. Give another seed for each impact.
 
     Returns:
         A `NextImpact`.
 
     Raises:
-        SceneError: a bad argument, or the flight meets no wall, or goes along one.
-        RunError: a law of the user gives a velocity that is not finite.
+        SceneError: a bad argument, or the flight meets no wall, or goes along a wall.
+        RunError: a user-defined law returns a velocity that is not finite.
 
-    Conserves: the energy ½mv² − mG·r to round-off, but for what the wall takes or gives.
+    Conserves: the energy ½mv² − mG·r to round-off, except for the energy that the wall takes or gives.
 
     >>> import swarm
     >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
@@ -85,7 +85,7 @@ def bounce(scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float =
     laws = compiled.laws or NONE
     random = RandomSource(Seeding(checks.seed("seed", seed)).signed(), 0).of_impact(0, 0, laws)
     r, v, flown = vec(particle.position[:, 0]), vec(particle.velocity[:, 0]), 0.0
-    # The functions of kernels, in plain Python; with NumPy's numbers 1/0 is an infinity as in compiled kernels.
+    # The functions of kernels run in plain Python; with numbers of NumPy, 1/0 is infinite as in compiled kernels.
     with np.errstate(all="ignore"):
         twice = square(v) + 2.0 * potential(pull, r)
         for _part in range(_PARTS):
@@ -113,7 +113,7 @@ def bounce(scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float =
 
 
 def _require_simple(scene: Scene) -> None:
-    """Raise a `SceneError` where the scene has more than walls at rest that are always there."""
+    """Raise a `SceneError` unless all walls of the scene are at rest, closed, and always present."""
     if scene.period is not None:
         raise SceneError("period must be None for a bounce, got one; use simulate with impacts=, a log of every impact")
     for i, surface in scene.pieces.owned():

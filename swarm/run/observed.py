@@ -1,4 +1,4 @@
-"""The observables of a frame that are no sums over its particles: how many are gone, and where walls are."""
+"""The observables of a frame that are no sums over its particles: numbers that have left, and poses of walls."""
 
 from typing import Any, NamedTuple
 
@@ -11,21 +11,21 @@ from ..state import Floats, State
 
 
 class Observed(NamedTuple):
-    """The surfaces of a scene as observed: those that react where they are, and how they move."""
+    """The surfaces of a scene as observed: their poses, and the motion of reacting ones."""
 
-    position: Floats  # (surfaces, 3) where what is given at the origin is [m]
+    position: Floats  # (surfaces, 3) the place of the origin of the given surface [m]
     orientation: Floats  # (surfaces, 4) quaternions (w, x, y, z)
     velocity: Floats  # (surfaces, 3) [m/s]
     spin: Floats  # (surfaces, 3) [rad/s]
     kinetic: Floats  # (surfaces,) [J]
-    potential: Floats  # (surfaces,) of gravity and springs, 0 at the start [J]
+    potential: Floats  # (surfaces,) the energy of gravity and springs, 0 at the start [J]
 
 
 def observed_of(scene: Scene, reacting: Any, moment: float) -> Observed:
-    """The surfaces of a scene at a moment [s].
+    """Return the surfaces of a scene at a moment [s].
 
-    `reacting` has, of the walls that react, in their order, the arrays `shift` and `velocity` (3, K) [m], [m/s], and of
-    those that turn `angle` and `rate` (K,) [rad], [rad/s].
+    `reacting` has the arrays `shift` and `velocity` (3, K) [m], [m/s] of the reacting walls, in their order, and for
+    walls that turn `angle` and `rate` (K,) [rad], [rad/s].
     """
     count, row = len(scene.surfaces), 0
     poses, gravity = scene.poses(moment), np.array(scene.gravity or (0.0, 0.0, 0.0))
@@ -57,7 +57,7 @@ def observed_of(scene: Scene, reacting: Any, moment: float) -> Observed:
 
 
 def gone_of(state: State, far: int, owners: NDArray[np.int64], surfaces: int) -> dict[str, Any]:
-    """How many have escaped, `far` of them through no opening, and how many each surface has absorbed.
+    """Return how many particles have escaped, `far` of them not through openings, and were absorbed by each surface.
 
     `owners` is the surface of each wall.
     """
@@ -71,7 +71,7 @@ def gone_of(state: State, far: int, owners: NDArray[np.int64], surfaces: int) ->
 
 
 def poses_of(scene: Scene, moment: float) -> dict[str, Any]:
-    """Where the surfaces are at a moment [s]."""
+    """Return the poses of the surfaces at a moment [s]."""
     poses = scene.poses(moment)
     return {
         "wall_position": np.array([pose.position() for pose in poses]),
@@ -80,13 +80,13 @@ def poses_of(scene: Scene, moment: float) -> dict[str, Any]:
 
 
 def balance(seen: dict[str, Any]) -> float:
-    """The energy of all, with what was lost, and without what sources brought, and the heat and the work of walls."""
+    """Return the total energy plus losses, minus the energy of sources and the heat and the work of walls."""
     kept = seen["total_energy"] + seen["dissipated_energy"] - seen["wall_heat"].sum() - seen.get("source_energy", 0.0)
     return float(kept - np.sum(seen.get("wall_work", 0.0)))
 
 
 def with_walls(seen: dict[str, Any], walls: Observed) -> dict[str, Any]:
-    """The observables with those of walls that react: their energy is a part of the whole."""
+    """Return the observables with those of reacting walls, the energy of which is added to the total."""
     energy = walls.kinetic + walls.potential
     return {
         **seen,

@@ -25,19 +25,19 @@ from . import measures
 from .progress import Display
 from .tiers import CHOICES
 
-# At shorter intervals [s] a run would do little but save checkpoints.
+# The shortest interval of checkpoints [s]: with shorter ones a run would do little else.
 _OFTEN = 0.01
-# Not a key of [run]: it belongs to one session, not to the run.
+# The option is no key of [run]: it belongs to one session, not to the run.
 _OF_A_SESSION = {"in_file": False}
 
 
 def cores() -> int:
-    """Number of cores that this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _logged(name: str, value: Any) -> Any:
-    """`value` as "all", k for every k-th particle, or a tuple of numbers of particles."""
+    """Return `value` as "all", k for every k-th particle, or a tuple of numbers of particles."""
     if isinstance(value, str):
         known = value == "all"
     elif isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
@@ -71,14 +71,14 @@ def _target(name: str, value: Any) -> Path | None:
     return None if value is None else paths.target_of_run(name, value)
 
 
-Target = Annotated[Any, _target]  # then a Path or None
+Target = Annotated[Any, _target]  # a Path or None after the check
 
 
 @dataclass(frozen=True)
 class RunOptions(Validated):
-    """The length of a run, its files, and the way it is carried out: the keywords of `simulate`, which describes each.
+    """The length of a run, its files, and the way it is carried out: the keywords of `simulate`, which describes them.
 
-    The keys of [run] are the fields of this class that a file has.
+    The keys of [run] in a scene file are fields of this class.
 
     Raises:
         SceneError: a value is out of its range, or two files are the same.
@@ -116,7 +116,7 @@ class RunOptions(Validated):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _ = self.times  # raises where every is above until
+        _ = self.times  # raises an error if every is above until
         paths.check_distinct({**self.files(), "recording": self.recording}, {})
         if self.shards is not None and self.cluster is None:
             raise SceneError(f"shards must be None without a cluster, got {self.shards}; give cluster=")
@@ -136,12 +136,12 @@ class RunOptions(Validated):
         return Storage(self.frames, self.precision, self.compression)
 
     def files(self) -> dict[str, Path | None]:
-        """The trajectory, its checkpoint, which may never be made, and the log of impacts."""
+        """Return the trajectory, its checkpoint, which may not be made, and the log of impacts."""
         saved = None if self.trajectory is None else paths.checkpoint_of(self.trajectory)
         return {"trajectory": self.trajectory, "checkpoint": saved, "log of impacts": self.impacts}
 
     def thread_count(self) -> int:
-        """Number of threads that compute."""
+        """Return the number of threads that compute."""
         return cores() if self.threads is None else self.threads
 
     def keeps_float32(self) -> bool:
@@ -149,7 +149,7 @@ class RunOptions(Validated):
         return self.precision == "float32" and (self.trajectory is not None or self.impacts is not None)
 
     def checkpoint_file(self) -> Path | None:
-        """The checkpoint; None without a trajectory."""
+        """Return the checkpoint; None without a trajectory."""
         if self.trajectory is None and (self.checkpoint is not None or self.resume):
             raise SceneError("checkpoint and resume need the trajectory of the run, got none; add trajectory=")
         return self.files()["checkpoint"]
@@ -157,13 +157,13 @@ class RunOptions(Validated):
 
 @dataclass(frozen=True)
 class Task:
-    """A run, checked.
+    """A checked run.
 
     Attributes:
-        particles: a copy of its own; of bodies all their points.
-        first: of a shard, the number of its first particle or body.
-        start: of a shard, a digest of all particles of the run.
-        scales: of a shard, the scales of the whole run (`tally.scales_of`).
+        particles: a copy of the particles; for bodies, all their points.
+        first: in a shard, the number of its first particle or body.
+        start: in a shard, a digest of all particles of the run.
+        scales: in a shard, the scales of the whole run (`tally.scales_of`).
     """
 
     compiled: CompiledScene
@@ -177,7 +177,7 @@ class Task:
 
     @property
     def scene(self) -> Scene:
-        """The scene as described."""
+        """The scene as users describe it."""
         return self.compiled.scene
 
     @property
@@ -187,10 +187,10 @@ class Task:
 
     @property
     def is_coupled(self) -> bool:
-        """Whether particles depend on one another: they meet, or move a wall. Such a run is one shard."""
+        """Whether particles depend on one another, as they meet or move a wall. Such a run is one shard."""
         return self.particles.radius is not None or self.scene.reacts()
 
     @property
     def is_shard(self) -> bool:
-        """Whether it is a shard of a run."""
+        """Whether the task is a shard of a run."""
         return bool(self.start)

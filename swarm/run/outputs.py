@@ -1,4 +1,4 @@
-"""The files of a run: its trajectory, its recording, or both."""
+"""The writers of the files of a run: its trajectory, its recording, its log of impacts."""
 
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def recorder_of(task: Task) -> "Writer | None":
-    """The writer of the recording, if there is one."""
+    """Return the writer of the recording, or None."""
     options = task.options
     if options.recording is None and not options.live:
         return None
@@ -35,7 +35,7 @@ def recorder_of(task: Task) -> "Writer | None":
 
 
 def writer_of(task: Task, session: Session, recorder: "Writer | None", log: Impacts | None) -> "Background | None":
-    """A context that gives the function which writes a frame, in a background thread."""
+    """Return a context with the function that writes a frame in a background thread, or None without files."""
     # The impacts of a frame are on the disk before the frame, so that readers of the frame find them.
     outputs = [
         (_impacts(task, session, log), slice(0)),

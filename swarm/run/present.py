@@ -1,4 +1,4 @@
-"""The particles of a run that are there at a frame: all, or, in a run with sources, the first ones."""
+"""The particles of a run in the scene at a frame: all, or in a run with sources the first ones."""
 
 import math
 from typing import Any
@@ -12,10 +12,10 @@ from ..state import Floats, State
 
 
 class Presence:
-    """The particles of the start, and those born by the end of a frame: kernels draw, and sums count, these alone.
+    """The particles of the start, and the particles born by the end of a frame: only these are drawn and summed.
 
     Args:
-        births: when particles are born, or None if all are in the scene from the start.
+        births: the births, or None if all particles are in the scene from the start.
         state: the state at the start, with the energy that each particle of a source brings in.
         size: the number of particles in a draw.
 
@@ -37,17 +37,17 @@ class Presence:
             self.order = np.arange(math.ceil(self.count / self._size))
 
     def of(self, array: NDArray[Any]) -> NDArray[Any]:
-        """The part of an array (N,) of these particles."""
+        """Return the part of an array (N,) of these particles."""
         return array if self._births is None else array[: self.count]
 
     def seen(self, state: State) -> State:
-        """The state that observers take: with the masses of these particles alone, which give their number."""
+        """Return the state that observers take, with the masses of these particles, which give their number."""
         if self._births is None and state.starts is None:
             return state
         return state._replace(mass=self.of(state.mass), starts=None)
 
     def sums(self, sums: Floats) -> Floats:
-        """The sums over chunks (quantities, chunks), with a last row for the energy brought in by sources so far."""
+        """Return the sums over chunks (quantities, chunks), with a last row for the energy that sources brought in."""
         if self._births is None:
             return sums
         brought = np.zeros((1, sums.shape[1]))
@@ -55,7 +55,7 @@ class Presence:
         return np.concatenate([sums, brought])
 
     def observed(self) -> dict[str, Any]:
-        """The number of particles born so far from each source, and the energy that they brought in."""
+        """Return the number of particles born so far from each source, and the energy that they brought in."""
         if self._births is None:
             return {}
         source = self._births.source[: self.count]
@@ -65,10 +65,10 @@ class Presence:
         return {"born": born.astype(np.int64), **brought}
 
     def flying(self, state: State) -> State:
-        """The state that kernels take: with the times of starts only where a law may let particles wait."""
+        """Return the state that kernels take, with the times of starts only if a law may let particles wait."""
         return state if state.starts is None or state.absorbed is not None else state._replace(starts=None)
 
 
 def total_of(sums: Floats) -> dict[str, Any]:
-    """The energy brought in by sources so far, from the sums over all chunks of `Presence.sums`."""
+    """Return the energy brought in by sources so far, from the sums over all chunks of `Presence.sums`."""
     return {"source_energy": float(np.add.reduce(np.ascontiguousarray(sums[-1])))}

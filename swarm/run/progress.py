@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-# ETA and speed come from the last seconds only: compile time would spoil an average from the start.
+# ETA and speed are those of the last seconds [s]: an average from the start would include compilation.
 _WINDOW = 10.0
-# Seconds between two looks at a frame; a frame that would take longer than the second time [s] hardly goes on.
+# The time between two looks at a frame, and the time of a frame above which it hardly goes on [s].
 LOOK, _A_MONTH = 10.0, 30 * 86400.0
 _LOG = logging.getLogger("swarm")
-# Seconds from one plain line to the next, and from one change of the bar to the next within a long frame.
+# The time between two plain lines, and between two changes of the bar within a long frame [s].
 _A_MINUTE, _A_MOMENT = 60.0, 1.0
 
 
@@ -25,14 +25,13 @@ def _nothing(*_args: Any) -> None:
 
 @dataclass(frozen=True)
 class Display:
-    """The observers of a run.
+    """The functions that show a run.
 
     Args:
-        frame: is called with every frame.
-        within: is called with the time that the particles have reached on average on the way to the next frame, and
-            the time of the end.
-        every: seconds of wall time from one such call to the next.
-        compiling: is called with a sentence before a kernel is compiled.
+        frame: called with every frame.
+        within: called within a frame with the time that particles have reached on average, and the end of the run.
+        every: the wall time from one call of `within` to the next [s].
+        compiling: called with a sentence before a kernel is compiled.
     """
 
     frame: Callable[[Any], None]
@@ -43,11 +42,11 @@ class Display:
 
 @contextlib.contextmanager
 def display(progress: "bool | Callable[[Any], None] | Display") -> Iterator[Display]:
-    """Nothing, the caller's own function or display, or a bar or lines on standard error."""
+    """Yield the display for the argument `progress`: nothing, a function or display, a bar or lines on stderr."""
     if isinstance(progress, Display):
         yield progress
     elif callable(progress):
-        # It gets a copy of the observables, which it may change.
+        # The function gets a copy of the observables, which it may change.
         yield Display(lambda frame: progress(frame.apart()))
     elif not progress:
         yield Display(_nothing)
@@ -57,7 +56,7 @@ def display(progress: "bool | Callable[[Any], None] | Display") -> Iterator[Disp
 
 
 class ProgressListener(NamedTuple):
-    """A listener to progress: by the share that is done and a line about it, or by a sentence."""
+    """A listener to progress: `put` takes the share done and a line about it, `say` a sentence."""
 
     put: Callable[[float, str], None]
     say: Callable[[str], None]
@@ -65,7 +64,7 @@ class ProgressListener(NamedTuple):
 
 @contextlib.contextmanager
 def progress_listener(sentences_stay: bool = False) -> Iterator[ProgressListener]:
-    """A bar on a terminal, above which sentences stay, or which shows them for a moment; else a line a minute."""
+    """Yield a bar on a terminal, which shows sentences above it or for a moment; else a line a minute."""
     if not sys.stderr.isatty():
         yield in_lines(_A_MINUTE)
         return
@@ -89,7 +88,7 @@ def progress_listener(sentences_stay: bool = False) -> Iterator[ProgressListener
 
 
 def in_lines(interval: float) -> ProgressListener:
-    """Print a line when the last one is `interval` seconds old."""
+    """Return a listener that prints a line when the last one is `interval` seconds old."""
     last = time.monotonic()
 
     def put(share: float, line: str) -> None:
@@ -103,7 +102,7 @@ def in_lines(interval: float) -> ProgressListener:
 
 
 def display_by(one: ProgressListener, every: float) -> Display:
-    """The display of a run, which shows the share that is done and a line about the last seconds."""
+    """Return the display of a run with the share done and a line about the last seconds."""
     recent = _Recent()
 
     def frame(done: Any) -> None:
@@ -118,14 +117,14 @@ def display_by(one: ProgressListener, every: float) -> Display:
 
 
 class _Recent:
-    """The last seconds of a run."""
+    """The values of a run in the last seconds."""
 
     def __init__(self) -> None:
         self._moments, self._impacts = Pace(_WINDOW), Pace(_WINDOW)
         self._energy = ""
 
     def frame(self, frame: Any) -> str:
-        """The line after this frame: time, ETA, speed and energy error."""
+        """Return the line after a frame: time, ETA, speed and energy error."""
         self._energy = f"  energy error {frame.observables['energy_error']:.1e}"
         if frame.number == 0:
             return ""
@@ -133,7 +132,7 @@ class _Recent:
         return self.within(frame.time, frame.until)
 
     def within(self, moment: float, until: float) -> str:
-        """The line within a frame, with the speed and the energy error of the last one."""
+        """Return the line within a frame, with the speed and the energy error of the last one."""
         self._moments.note(moment)
         elapsed, impacts = self._impacts.lately()
         speed = f"  {impacts / elapsed:.3g} impacts/s" if elapsed > 0.0 else ""
@@ -143,7 +142,7 @@ class _Recent:
 class Standstill:
     """A warning, once in a run, of a frame that hardly goes on.
 
-    `cause` gives a sentence about what else in the scene may be the cause, or an empty one.
+    `cause` returns a sentence about another possible cause in the scene, or an empty one.
     """
 
     def __init__(self, cause: Callable[[], str] = str) -> None:
@@ -151,10 +150,10 @@ class Standstill:
         self._shares, self._about, self._has_warned, self._is_slow = Pace(LOOK), (0, 0.0), False, False
 
     def look(self, number: int, share: float, behind: tuple[int, list[float]] | None, compiled: float) -> None:
-        """Look at a frame, of which this share is done.
+        """Look at a frame with a share done.
 
-        `behind` is (the particle with the most time left, its place [m]); `compiled` is the time of compilations so far
-        [s], during which a frame does not advance.
+        `behind` is the particle with the most time left, and its place [m]. `compiled` is the time of compilations so
+        far [s], during which a frame does not advance.
         """
         if (number, compiled) != self._about:
             self._shares, self._about, self._is_slow = Pace(LOOK), (number, compiled), False
@@ -162,7 +161,7 @@ class Standstill:
         elapsed, advanced = self._shares.lately()
         if self._has_warned or elapsed < LOOK:
             return
-        # Twice in a row: other work of the machine may last for as long.
+        # A run must be slow twice in a row, as other work of the machine may last as long.
         was_slow, self._is_slow = self._is_slow, advanced * _A_MONTH < (1.0 - share) * elapsed
         if not (was_slow and self._is_slow):
             return
@@ -181,28 +180,28 @@ class Standstill:
 
 
 class Pace:
-    """A value that grows, in the last `window` seconds."""
+    """The growth of a value in the last `window` seconds."""
 
     def __init__(self, window: float) -> None:
         self._window = window
         self._values: deque[tuple[float, float]] = deque()
 
     def note(self, value: float) -> None:
-        """Add a value, and drop those before the window."""
+        """Add a value, and drop the values before the window."""
         now = time.monotonic()
         self._values.append((now, value))
         while len(self._values) > 2 and now - self._values[0][0] > self._window:
             self._values.popleft()
 
     def lately(self) -> tuple[float, float]:
-        """(seconds, difference) from the first value to the last."""
+        """Return the time [s] and the difference from the first value to the last."""
         if not self._values:
             return 0.0, 0.0
         (began, before), (now, value) = self._values[0], self._values[-1]
         return now - began, value - before
 
     def eta(self, end: float) -> str:
-        """The time from the last value to the end, if that is known."""
+        """Return the text of the time from the last value to the end, empty if it is not known."""
         elapsed, advanced = self.lately()
         if not (elapsed > 0.0 and advanced > 0.0):
             return ""

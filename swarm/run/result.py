@@ -35,49 +35,53 @@ class Result:
 
     Attributes:
         particles: the particles at `until`.
-        observables: name -> array with one entry a frame: "time" [s]; "kinetic_energy", "potential_energy",
-            "contact_energy" and their sum, "total_energy" [J]; "dissipated_energy", what contacts have lost so far [J];
-            counts since 0 s, "impacts", "escaped", "unconverged" and "sweeps"; how many are "sliding", and how long
-            all have been, "sliding_time" [s]; the worst particle's "energy_error", relative to its energy at the start,
-            and "max_penetration" into a wall [m]; "momentum" and "angular_momentum" (frames, 3), "impulse" and
-            "wall_heat" (frames, surfaces). Where a surface is a union or an intersection also "part_impulse" and
-            "part_heat" (frames, parts), of each of `scene.parts`. Where walls move also "wall_work" (frames, surfaces)
-            [J] and, except in runs of bodies, "wall_position" (frames, surfaces, 3) [m] and "wall_orientation" (frames,
-            surfaces, 4), quaternions (w, x, y, z): the point xi of the surface as given is at position + orientation
-            xi. Where walls react also "wall_energy" (frames, surfaces) [J], which "total_energy" includes,
-            "wall_velocity" [m/s] and "wall_spin" [rad/s] (frames, surfaces, 3). Of bodies also "link_error", the "work"
-            of anchors that move [J], and "cavity_impulse" (frames, cavities) on the cavities that points carry [N s].
+        observables: name -> array with one entry for each frame: "time" [s]; "kinetic_energy", "potential_energy",
+            "contact_energy" and their sum, "total_energy" [J]; "dissipated_energy", the energy lost in contacts so far
+            [J]; counts since 0 s, "impacts", "escaped", "unconverged" and "sweeps"; the number of particles that are
+            "sliding", and "sliding_time", the time that all have slid [s]; "energy_error" of the worst particle,
+            relative to its energy at the start, and "max_penetration" into a wall [m]; "momentum" and
+            "angular_momentum" (frames, 3), "impulse" and "wall_heat" (frames, surfaces). If a surface is a union or an
+            intersection also "part_impulse" and "part_heat" (frames, parts), of each of `scene.parts`. If walls move
+            also "wall_work" (frames, surfaces) [J] and, except in runs of bodies, "wall_position" (frames, surfaces,
+            3) [m] and "wall_orientation" (frames, surfaces, 4), quaternions (w, x, y, z): the point xi of the surface
+            as given is at position + orientation xi. If walls react also "wall_energy" (frames, surfaces) [J], which
+            "total_energy" includes, "wall_velocity" [m/s] and "wall_spin" [rad/s] (frames, surfaces, 3). For bodies
+            also "link_error", the "work" of anchors that move [J], and "cavity_impulse" (frames, cavities) on the
+            cavities that points carry [N s].
             With member_impacts=True "member_impacts" (frames, members) of all members of surface 0, then of surface 1,
-            and so on. Where particles may slide also "member_residence" [s], the time for which they slid, rested or,
-            by a law, waited there; at an edge it counts for the wall that they were on before, and a wait counts as a
-            whole when it begins. Where walls heat or absorb particles also "member_heat" [J] and "member_absorbed".
-            Where laws of walls return a `Leave` also "absorbed" (frames, surfaces), how many each has absorbed so far.
-            With counters "crossings" (frames, counters, 2), how many have crossed each since 0 s, out of its admissible
-            side and back; what they carried, "crossed_momentum" (frames, counters, 2, 3) [kg m/s] and "crossed_energy"
-            (frames, counters, 2) [J]; and "crossed_slowness", the sum of 1/|v_n| [s/m]. A flux is a difference between
-            frames over their time; see `Counter`.
-            Of particles with a radius also "collisions", the number of pairs that met since 0 s. Two are means since
-            the frame before: "collision_rate", the pairs that met per second [1/s], and "pressure" [Pa, in a plane
-            N/m], by the virial, (2 K + sum r_ij . J_ij/dt)/(d V). The pressure is NaN at the start and where no volume
-            is known: V is `particles.volume`, or the cell of a scene without surfaces. Where particles have a spin also
-            "rotational_energy" [J]; "total_energy" includes it, and "angular_momentum" includes the spins. With Penalty
-            also "largest_overlap" [m], the largest overlap of two balls, or of a ball and a wall, at any end of a step
-            since the frame before.
+            and so on. If particles may slide also "member_residence" [s], the time that they slid, rested or, by a
+            law, waited there; at an edge it counts for the wall that they were on before, and a wait counts as a whole
+            when it begins. If walls heat or absorb particles also "member_heat" [J] and "member_absorbed".
+            If laws of walls return a `Leave` also "absorbed" (frames, surfaces), the number of particles that each
+            surface has absorbed so far.
+            With counters "crossings" (frames, counters, 2), the number of crossings of each counter since 0 s, out of
+            its admissible side and back; "crossed_momentum" (frames, counters, 2, 3) [kg m/s] and "crossed_energy"
+            (frames, counters, 2) [J] of the particles that crossed; and "crossed_slowness", the sum of 1/|v_n| [s/m].
+            A flux is a difference between frames over their time; see `Counter`.
+            For particles with a radius also "collisions", the number of pairs that met since 0 s. Two observables are
+            means since the frame before: "collision_rate", the pairs that met per second [1/s], and "pressure" [Pa, in
+            a plane N/m], by the virial, (2 K + sum r_ij . J_ij/dt)/(d V). The pressure is NaN at the start and if no
+            volume is known: V is `particles.volume`, or the cell of a scene without surfaces. If particles have a spin
+            also "rotational_energy" [J]; "total_energy" includes it, and "angular_momentum" includes the spins. With
+            Penalty also "largest_overlap" [m], the largest overlap of two balls, or of a ball and a wall, at any end
+            of a step since the frame before.
             With sources "born" (frames, sources), the number of particles born so far, and "source_energy" [J], the
-            energy that they brought in. No observable counts particles that are born later. Of balls also "blocked"
+            energy that they brought in. No observable counts particles that are born later. For balls also "blocked"
             (frames, sources), the number of births that found no free place at their time.
-        wall_time: seconds the run took in all its sessions, compilation included.
+        wall_time: the time that the run took in all its sessions, with compilation [s].
         trajectory: the file that was written, or None.
-        multipliers: for a method with multipliers, the statistics of their loops, per particle; else None.
-        impacts_per_particle: (N,) how many impacts each has had.
-        escape_time: (N,) when each passed an opening of a wall [s], where it stays from then on; NaN of those inside.
-        absorbed_time: (N,) when a law of a wall absorbed each [s], where it stays from then on; NaN of the others.
-        bodies: the bodies at `until`, or None; then `particles` are all their points.
+        multipliers: the statistics of the loops of each particle for a method with multipliers; else None.
+        impacts_per_particle: (N,) the number of impacts of each particle.
+        escape_time: (N,) the time at which each particle passed an opening of a wall [s], where it stays from then on;
+            NaN for particles inside.
+        absorbed_time: (N,) the time at which a law of a wall absorbed each particle [s], where it stays from then on;
+            NaN for other particles.
+        bodies: the bodies at `until`, or None; with bodies, `particles` are all their points.
         scene, method: the arguments of the run.
-        birth_time: (N,) when each came [s], 0 of those of the start, NaN of balls that were never born, which are at
-            NaN in `particles`: `particles.born()` are the others.
-        collisions_per_particle: (N,) how often each has met another one; None for points, which do not meet.
-        compile_time: seconds of the wall time in which the last session compiled kernels; 0 on a cluster.
+        birth_time: (N,) the time of birth of each particle [s], 0 for particles of the start, NaN for balls that were
+            not born, which are at NaN in `particles`: `particles.born()` are the others.
+        collisions_per_particle: (N,) the number of collisions of each ball; None for points, which do not meet.
+        compile_time: the part of the wall time in which the last session compiled kernels [s]; 0 on a cluster.
     """
 
     particles: Particles
@@ -117,7 +121,7 @@ class Result:
         return notebook.table("Result", rows.items())
 
     def table(self) -> "pandas.DataFrame":
-        """The observables as a pandas frame: `time` first, a row for each frame; see `Trajectory.table`.
+        """Return the observables as a pandas frame, `time` first, a row for each frame; see `Trajectory.table`.
 
         Raises:
             SceneError: pandas is not installed.
@@ -135,14 +139,14 @@ class Result:
         """The impacts on each member of each surface since 0 s, in all sessions; None without member_impacts=True.
 
         A list with an array for each surface: (members,) for a field such as `Spheres`, for the facets of a `Mesh` and
-        for the parts of a union, and (1,) for any other surface. In a cell that repeats all images of a solid are one
+        for the parts of a union, and (1,) for any other surface. In a periodic cell all images of a solid are one
         member.
         """
         return self._of_members("member_impacts")
 
     @property
     def member_residence(self) -> list[NDArray[np.float64]] | None:
-        """How long particles have slid, rested or waited on each member [s], as `member_impacts`; None if none may.
+        """The time that particles slid, rested or waited on each member [s], as `member_impacts`; None if not possible.
 
         A wait, of `Sticky`, counts as a whole when it begins.
         """
@@ -150,12 +154,12 @@ class Result:
 
     @property
     def member_heat(self) -> list[NDArray[np.float64]] | None:
-        """The heat that each member has given [J], as `member_impacts`; None where no wall gives any."""
+        """The heat that each member has given [J], as `member_impacts`; None if no wall gives heat."""
         return self._of_members("member_heat")
 
     @property
     def member_absorbed(self) -> list[NDArray[np.int64]] | None:
-        """The particles that each member has absorbed, as `member_impacts`; None where no wall absorbs."""
+        """The number of particles absorbed by each member, as `member_impacts`; None if no wall absorbs particles."""
         return self._of_members("member_absorbed")
 
     def _of_members(self, name: str) -> list[NDArray[Any]] | None:
@@ -165,19 +169,19 @@ class Result:
 
     @property
     def frames(self) -> "Frames":
-        """The frames of the trajectory: a sequence of `Frame`, each with its particles read when they are asked for.
+        """The frames of the trajectory: a sequence of `Frame`; the particles of each are read when they are used.
 
         Raises:
-            SceneError: the run has no trajectory, or it is gone or damaged.
+            SceneError: the run has no trajectory, or its file is missing or damaged.
         """
-        path = self._written("frames are", ", or take what is needed of each frame by progress= or observables=")
+        path = self._written("frames are", ", or take the needed arrays of each frame by progress= or observables=")
         from ..files.trajectory import load
         from .sequence import Frames
 
         return Frames(load(path))
 
     def _written(self, what: str, otherwise: str = "") -> Path:
-        """The path of the trajectory; the error without one begins with `what`, such as "frames are"."""
+        """Return the path of the trajectory; the error without one begins with `what`, such as "frames are"."""
         if self.trajectory is None:
             raise SceneError(
                 f"{what} those of the trajectory, and this run has written none; give trajectory={otherwise}"
@@ -187,11 +191,11 @@ class Result:
     def film(
         self, *, frames: int = 100, fps: float = 25.0, size: tuple[int, int] = (640, 480), particles: int = 5000
     ) -> "Film":
-        """A film of the trajectory, which a notebook shows; see `Trajectory.film`.
+        """Return a film of the trajectory, which a notebook shows; see `Trajectory.film`.
 
         Raises:
-            SceneError: the run has no trajectory, or it is gone or damaged or keeps no particles, an argument is out of
-                its range, or matplotlib or scikit-image is not installed.
+            SceneError: the run has no trajectory, its file is missing or damaged or keeps no particles, an argument is
+                out of its range, or matplotlib or scikit-image is not installed.
         """
         path = self._written("the frames of a film are")
         from ..files.trajectory import load
@@ -202,7 +206,7 @@ class Result:
     def plot(self, *, particles: int = 5000, figsize: tuple[float, float] | None = None) -> "Figure":
         """Draw the run in one picture; see `Trajectory.plot`.
 
-        Without a trajectory, or where that keeps no particles, the speeds at the start are left out, and colours are
+        Without a trajectory, or if it keeps no particles, the speeds at the start are left out, and colours are
         relative to the particles at the end.
 
         Raises:
@@ -217,12 +221,12 @@ class Result:
         return cast("Figure", view("plot").figure_of(self.content("plot"), figsize, particles))
 
     def report(self, path: str | Path | None = None, *, overwrite: bool = False) -> "Page":
-        """A page of the run, one file in HTML, which a notebook shows; see `Trajectory.report`.
+        """Return a page of the run, one file in HTML, which a notebook shows; see `Trajectory.report`.
 
-        Without a trajectory it does not say how to reproduce the run.
+        Without a trajectory the page does not say how to reproduce the run.
 
         Args:
-            path: `.html`, where the page is written; None: it is only returned.
+            path: the file (.html) to write; None: the page is only returned.
             overwrite: replace an existing file.
 
         Raises:
@@ -246,5 +250,5 @@ class Result:
         return cast("Page", pages.report_of_content(self.content("report"), self.wall_time, path, overwrite))
 
     def content(self, what: str) -> "Content":
-        """What pictures and verdicts are made of; `what` is the view that needs it, for the sentence of an error."""
+        """Return the content of pictures and verdicts; `what` is the view that needs it, for an error."""
         return cast("Content", view("content").content_of_result(self, what))

@@ -1,4 +1,4 @@
-"""The frames of a trajectory as a sequence, read on demand."""
+"""The frames of a trajectory as a sequence that is read on demand."""
 
 import functools
 from collections.abc import Sequence
@@ -13,9 +13,9 @@ from ..files.trajectory import Trajectory
 
 
 class Frames(Sequence[Frame]):
-    """The frames of a trajectory: `len`, one by its number, a slice, and a loop over them.
+    """The frames of a trajectory, with `len`, a frame by its number, a slice, and a loop over them.
 
-    The particles of each are read when they are asked for, and as long as it is there.
+    The particles of a frame are read when they are used, as long as the file exists.
 
     >>> import swarm, tempfile
     >>> cavity = swarm.Scene(surfaces=[swarm.Sphere(radius=0.5)])
@@ -60,7 +60,7 @@ class Frames(Sequence[Frame]):
 
 
 def values_of(trajectory: Trajectory, k: int, name: str) -> Any:
-    """An array of the particles of frame k by its name, or None if they do not have it."""
+    """Return an array of the particles of frame k by its name, or None if they do not have it."""
     if name == "collisions" and trajectory.radius is None:
         return None
     read = {"impacts": trajectory.impacts, "escape_time": trajectory.escape_times,

@@ -1,4 +1,4 @@
-"""One session of a run: where it starts, when it saves a checkpoint, when it ends. A run may take several."""
+"""A session of a run: its start, its checkpoints, its end. A run may have several sessions."""
 
 import contextlib
 import dataclasses
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 class Session:
     """A session of a run, from the start or a checkpoint to the end, a signal or the wall time limit.
 
-    It locks the trajectory. Without a trajectory it saves nothing.
+    A session locks the trajectory. Without a trajectory it saves nothing.
 
     Args:
         options: the options of the run.
-        counted_from: when the wall time began [s of time.monotonic]; None: now.
+        counted_from: the start of the wall time [s of time.monotonic]; None: now.
     """
 
     def __init__(self, options: RunOptions, counted_from: float | None = None) -> None:
@@ -43,14 +43,14 @@ class Session:
         self._every = math.inf if options.checkpoint is None else options.checkpoint
         self._end = math.inf if options.walltime is None else counted_from + options.walltime
         self._took = 0.0  # the time that the last checkpoint took [s]
-        # A checkpoint half way to the limit measures that time.
+        # A checkpoint half way to the limit measures this time.
         self._due = self._began + min(self._every, 0.5 * (self._end - self._began) if self._saves else math.inf)
         self._stops = False
-        # These are None in a run without a trajectory.
+        # The following are None in a run without a trajectory.
         self._trajectory: Any = options.trajectory
         self._path: Any = options.checkpoint_file()
         self._job: Any = None
-        # What identifies the run in its files, besides its texts.
+        # The entries that identify the run in its files, besides its texts.
         self.identity: dict[str, Any] = {}
         self._arrays: checkpoint.Arrays | None = None
         self._is_under_way = self._has_checkpoint = False
@@ -70,7 +70,7 @@ class Session:
             raise FileError(f"{error}{self._way_on()}") from error
 
     def _way_on(self) -> str:
-        """How to go on after a run could not write its files, as the end of a sentence."""
+        """Return the end of a sentence on how to go on after a run could not write its files."""
         if self._has_checkpoint:
             return f"; with resume the run goes on from {self._path}"
         if not self._saves:
@@ -86,13 +86,13 @@ class Session:
         return 0 if self._arrays is None else int(self._job.frame) + 1
 
     def prepare(self, task: Task, log: Impacts | None) -> None:
-        """Find where this session starts: at 0 s with a new file or, to resume, at the checkpoint if there is one.
+        """Find the start of this session: 0 s with a new file or, to resume, the checkpoint if it exists.
 
         Raises:
-            SceneError: the trajectory cannot become a new file; or it, or the checkpoint, is of another run, is damaged
-                or is missing.
+            SceneError: the trajectory cannot become a new file; or the trajectory or the checkpoint is of another run,
+                damaged or missing.
             CompleteError: nothing is left to do.
-            FileError: another run writes that trajectory.
+            FileError: another run writes the trajectory.
         """
         if self._trajectory is None and log is None:
             return
@@ -139,14 +139,14 @@ class Session:
         self._job = checkpoint.SavedRun(VERSION, **texts, particles=len(task.particles), **self.identity)
 
     def _check(self, path: Path, overwrite: bool, what: str) -> None:
-        """Raise a SceneError if the session cannot write this file, or may not replace it."""
+        """Raise a `SceneError` if the session cannot write a file, or may not replace it."""
         if self._resumes and (not overwrite or self._path.exists()):
-            paths.check_place(path, what)  # it goes on in the file, which it reads first
+            paths.check_place(path, what)  # the session reads the file, and goes on in it
         else:
             marks.check_target(path, overwrite, what)
 
     def _find_log(self, task: Task, overwrite: bool) -> None:
-        """Raise a SceneError if the run cannot go on with its log of impacts, or begin it anew."""
+        """Raise a `SceneError` if the run can neither go on with its log of impacts nor begin it anew."""
         path: Path = task.options.impacts
         if self.first == 0 and (overwrite or not path.exists()):
             return
@@ -156,14 +156,14 @@ class Session:
             there = dataclasses.replace(self._job, **before.identity)
             there.require_same(dataclasses.replace(self._job, particles=task.count), path)
             if self.first == 0:
-                return  # a kill came before the first frame of the trajectory
+                return  # the run was killed before the first frame of the trajectory
             before.require_holds(self._job.frame + 1, self._job.rows, self._job.sums, self._path)
             before.require_intact()
 
     def _refuse_to_restart(self, until: float, overwrite: bool) -> None:
         """Raise the error for a trajectory without a checkpoint: complete, of another run, or in the way.
 
-        With `overwrite` only one that is complete is an error: a job that comes again has nothing to do.
+        With `overwrite` only a complete trajectory is an error, as a repeated job has nothing to do.
         """
         try:
             self._refuse(until)
@@ -184,8 +184,8 @@ class Session:
             frames, last = len(before), before.times[-1:]
         if not there.start:
             raise SceneError(
-                f"{trajectory} must say of which start it is, to be resumed or found complete, got one of a version "
-                "that did not store it; choose another name, or overwrite it with --overwrite"
+                f"{trajectory} must have the digest of its start, to be resumed or found complete, got one of a "
+                "version that did not store it; choose another name, or overwrite it with --overwrite"
             )
         there.require_same(self._job, trajectory)
         if frames and last[0] >= until:
@@ -221,7 +221,7 @@ class Session:
         self._job, self._arrays = saved, arrays
 
     def restore(self, run: BaseRun) -> None:
-        """Put the run into the state of the checkpoint."""
+        """Set the run to the state of the checkpoint."""
         if self._arrays is not None:
             checkpoint.require_fit(self._path, self._arrays, run.arrays(), self._job.version, run.may_grow)
             if self._log is not None:
@@ -231,10 +231,10 @@ class Session:
         self._is_under_way, self._has_checkpoint = True, self._arrays is not None
 
     def frames(self, times: FrameTimes) -> Iterator[tuple[int, float, float]]:
-        """The frames of this session: number, the time before, and the time [s].
+        """Yield the frames of this session: number, the time of the frame before, and the time [s].
 
         Raises:
-            SceneError: a frame of the checkpoint was, or was to be, at another time.
+            SceneError: a frame of the checkpoint was, or would be, at another time.
         """
         job = self._job
         for number, before, moment in times:
@@ -249,11 +249,11 @@ class Session:
                 yield number, before, moment
 
     def latest(self, writer: "Background | None") -> float:
-        """The time at which `look` is due [s of time.monotonic]."""
+        """Return the time at which `look` is due [s of time.monotonic]."""
         return min(self._due, self._last_call(writer))
 
     def _last_call(self, writer: "Background | None") -> float:
-        """The latest time to stop [s of time.monotonic]: the queue and a checkpoint are then written by the limit."""
+        """Return the latest time to stop, to write the queue and a checkpoint by the limit [s of time.monotonic]."""
         return self._end - self._took - (0.0 if writer is None else writer.backlog())
 
     def stop(self) -> None:
@@ -261,14 +261,14 @@ class Session:
         self._stops = True
 
     def wall_time(self) -> float:
-        """The wall time of all sessions of the run [s]."""
+        """Return the wall time of all sessions of the run [s]."""
         before: float = 0.0 if self._job is None else self._job.wall_time
         return time.monotonic() - self._began + before
 
     def look(
         self, run: BaseRun, writer: "Background | None", frame: int, moment: float, following: float | None
     ) -> None:
-        """Save a checkpoint if one is due, and end if it is time: after `frame`, or within the frame at `following`.
+        """Save a checkpoint if it is due, and end if it is time: after `frame`, or within the frame at `following`.
 
         Raises:
             KeyboardInterrupt: `stop` was called.
@@ -289,7 +289,7 @@ class Session:
             raise WallTimeError(f"the wall time of this run is over at {moment:g} s", late)
 
     def _save(self, run: BaseRun, writer: Any, frame: int, moment: float, following: float | None) -> None:
-        # First the frames: a checkpoint is never ahead of them.
+        # Frames are written first, so that a checkpoint is never ahead of them.
         writer.drain()
         job = dataclasses.replace(
             self._job, frame=frame, time=moment, following=following, wall_time=self.wall_time(),

@@ -1,4 +1,4 @@
-"""From a scene to frames, on this machine or on a cluster."""
+"""The function `simulate`: from a scene to frames, on this machine or on a cluster."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -69,66 +69,66 @@ def simulate(  # noqa: PLR0913  the keywords are the public interface
 
     Args:
         scene: the walls and gravity.
-        particles: the start, particles or bodies; it is not changed. None: `sources` give all.
-        method: how to advance; None: `Impact()`. Bodies need Impact with a dt, Penalty, or AugmentedLagrangian with
-            adaptive=True.
+        particles: the particles or bodies at the start, which are not changed. None: all come from `sources`.
+        method: the method that advances them; None: `Impact()`. Bodies need Impact with a dt, Penalty, or
+            AugmentedLagrangian with adaptive=True.
         until: end of the run [s], above 0.
-        every: time between frames [s], at most `until`; None: only the first and the last.
+        every: time between frames [s], at most `until`; None: only the first and the last frame.
         trajectory: HDF5 file to write; its folder must exist.
-        recording: Rerun file to write; its folder must exist. Needs the packages of the extra "record".
+        recording: Rerun file to write; its folder must exist. It needs the packages of the extra "record".
         impacts: HDF5 file for a log of every impact, not with the baselines; see `load_impacts`. Its folder must
             exist.
-        impact_particles: the particles with impacts in that log: "all", k for every k-th one, or a list of numbers.
-        member_impacts: True to count the impacts on each member of each surface, and how long particles stay there; see
-            `Result`.
+        impact_particles: the particles with impacts in this log: "all", k for every k-th one, or a list of numbers.
+        member_impacts: True to count the impacts on each member of each surface, and the time that particles stay
+            there; see `Result`.
         observables: user-defined observables, functions by their names. Each is called with every `Frame` and returns a
             number, or an array of the same shape at every frame. The values are kept in float64, with the other
-            observables; NaN means no value. The functions are tried at the start, before anything is compiled. They
+            observables; NaN means no value. The functions are called at the start, before anything is compiled. They
             get all particles, also on a cluster, where the client calls them when the shards have ended.
-        counters: surfaces that count the particles that cross them, and stop none; not with a contact_step. Each is a
-            surface at rest or a `Counter`. The motion has the same bits without them. With fixed steps a particle
-            crosses a counter that is between the two ends of a step. A body crosses with its centre of mass. See
-            `Result.observables`.
+        counters: surfaces that count the particles that cross them, and do not stop them; not with a contact_step. Each
+            is a surface at rest or a `Counter`. The motion has the same bits without counters. With fixed steps a
+            particle crosses a counter that is between the two ends of a step. A body crosses with its centre of mass.
+            See `Result.observables`.
         record_particles: the most particles recorded, evenly chosen.
-        record_color: what the colour of a recorded particle shows, "speed" or "energy-error".
+        record_color: the quantity that the colour of a recorded particle shows, "speed" or "energy-error".
         record_megabytes: largest size of the recording [MB], above 0; if all frames take more, every k-th is recorded.
         live: True to show the run in a Rerun viewer on this machine, or the URL of a viewer.
-        threads: number of threads; None: all cores this process may use. Results have the same bits for any number.
-        progress: True for a progress bar, or a function that is called with every `Frame`, which has the
-            particles.
+        threads: number of threads; None: all cores that this process may use. Results have the same bits for any
+            number.
+        progress: True for a progress bar, or a function that is called with every `Frame`, which has the particles.
         overwrite: replace an existing recording, and an existing trajectory as soon as the first frame is complete.
-        scene_text: the scene file's text, kept in the trajectory; None: it is written from the objects.
-        block_size: particles that a thread takes at a time. Results do not depend on it.
-        frames: what the trajectory keeps of the particles: "all", "none", or k, every k-th one.
-        precision: "float64", or "float32" for frames, and rows of the log of impacts, of half the size; observables,
+        scene_text: the text of the scene file, kept in the trajectory; None: it is written from the objects.
+        block_size: number of particles that a thread takes at a time. Results do not depend on it.
+        frames: the particles that the trajectory keeps: "all", "none", or k for every k-th one.
+        precision: "float64", or "float32" for frames and rows of the log of impacts of half the size; observables,
             checkpoints and the times of impacts stay exact. Far from the origin "float32" is refused.
-        compression: of the frames, "none", "gzip" or "lzf".
-        checkpoint: seconds of wall time from one checkpoint to the next, above 0; None: none. It is the
-            file TRAJECTORY.checkpoint, until the run is complete.
-        resume: continue from that checkpoint, with the same bits as if the run had never stopped; start a new run if
-            there is neither a checkpoint nor a trajectory.
-        walltime: seconds of wall time after which the run stops: it stops computing early enough to write the frames
-            in its queue, and a checkpoint if it makes any. A compilation under way ends first.
-        compile: "auto": kernels that an earlier run compiled are used. With up to 2000 particles the other kernels run
-            in plain Python, with the same bits, until the runs of this process have spent about a second there; then
-            they are compiled. With more particles they are compiled at once.
-            "always": compiled from the start. "never": plain Python only.
+        compression: the compression of the frames, "none", "gzip" or "lzf".
+        checkpoint: wall time from one checkpoint to the next [s], above 0; None for no checkpoints. The checkpoint is
+            the file TRAJECTORY.checkpoint, until the run is complete.
+        resume: continue from that checkpoint, with the same bits as without the stop; start a new run if there is
+            neither a checkpoint nor a trajectory.
+        walltime: wall time after which the run stops [s]. It stops early enough to write the frames in its queue, and
+            a checkpoint if it makes checkpoints. A compilation under way ends first.
+        compile: "auto" uses kernels that an earlier run compiled. With up to 2000 particles the other kernels run in
+            plain Python, with the same bits, until the runs of this process have spent about a second there; then
+            they are compiled. With more particles they are compiled at once. "always" compiles all kernels from the
+            start, and "never" uses plain Python only.
         seed: seed of the random numbers of walls and sources, from 0 to 2**64 - 1: the same seed gives the same bits.
-        cluster: where to run: None for this machine; "local:N", N worker processes on it; the address of a scheduler of
-            Dask, such as "tcp://10.0.0.1:8786"; or a `distributed.Client`. Needs a trajectory, and the packages of the
-            extra "cluster". The particles are split into shards, with files in the folder TRAJECTORY.shards, which the
-            trajectory needs; results have the same bits as without. A worker that dies is replaced, and its shard goes
-            on from its checkpoint, by default of every 60 s.
+        cluster: the cluster of the run: None for this machine; "local:N" for N worker processes on it; the address of a
+            scheduler of Dask, such as "tcp://10.0.0.1:8786"; or a `distributed.Client`. It needs a trajectory, and the
+            packages of the extra "cluster". The particles are split into shards, with files in the folder
+            TRAJECTORY.shards, which the trajectory needs; results have the same bits as without a cluster. A worker
+            that dies is replaced, and its shard goes on from its checkpoint, by default one every 60 s.
         shards: number of shards on a cluster; None: one for each thread of its workers. A run of particles that meet,
             or that move a wall, is one shard.
-        sources: the `Source`s of particles that come during the run, not with a contact_step; None: no particles come.
+        sources: the `Source`s of particles that are born during the run, not with a contact_step; None for no births.
             Births are drawn from `seed`.
 
     Returns:
         A `Result`.
 
     Raises:
-        SceneError: bad input, or a checkpoint of another run; nothing has run or been written.
+        SceneError: bad input, or a checkpoint of another run; nothing has been run or written.
         FileError: an output cannot be written, or another run is writing it.
         RunError: a step failed; the frames before it are in the trajectory.
         KeyboardInterrupt: SIGINT or SIGTERM came; the frames before it are in the trajectory.
@@ -160,7 +160,7 @@ def carry_out(
     options: RunOptions,
     counted_from: float | None = None,
 ) -> Result:
-    """`simulate` with its keywords as `RunOptions`; the wall time counts from `counted_from` [s], or from now."""
+    """Carry out `simulate` with `RunOptions`; the wall time counts from `counted_from` [s], or from now."""
     if options.cluster is None:
         session = Session(options, counted_from)
         return machine.carry_out_task(task_of(scene, particles, method, options), session)

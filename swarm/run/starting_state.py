@@ -14,16 +14,17 @@ from ..state import Contacts, Floats, Multipliers, State, none_left
 
 
 class Seeding(NamedTuple):
-    """What random numbers depend on besides the impact: the seed, and the number of the first particle of this run.
+    """The seed of random numbers, and the number of the first particle of this run.
 
-    The number is 0 except in a shard, where particles are numbered as in the whole run.
+    Random numbers depend on these and on the impact. The number is 0 except in a shard, where particles are numbered as
+    in the whole run.
     """
 
     seed: int = 0
     first: int = 0
 
     def signed(self) -> int:
-        """The seed for kernels: the signed integer with the same 64 bits."""
+        """Return the seed for kernels: the signed integer with the same 64 bits."""
         return self.seed - 2**64 if self.seed >= 2**63 else self.seed
 
 
@@ -33,17 +34,17 @@ UNSEEDED = Seeding()
 def state_of(
     compiled: CompiledScene, particles: Particles, method: Method, booked: int, presses: bool = False
 ) -> State:  # fmt: skip
-    """The state with the arrays of the particles; `start_energies` sets the energies.
+    """Return the state with the arrays of the particles; `start_energies` sets the energies.
 
     `booked` is the number of rows of impulse and work; `presses` is whether impulses are kept until a contact ends.
     """
     n, laws, rows = len(particles), compiled.laws, len(compiled.numbering.surfaces_of_rows)
     period, openings, ends = compiled.cell(), compiled.openings(), laws is not None and laws.may_end
-    # When each particle flies first, None where all do at once and none may wait on a wall later.
+    # The time from which each particle flies; None if all fly at once and no particle may wait on a wall later.
     starts = np.full(n, -math.inf) if ends else None
     if particles.births is not None:
         starts = particles.births.time.copy()
-    # What soft contacts have stored is lost with a wall that goes, or opens.
+    # The stored energy of soft contacts is lost with a wall that becomes absent, or opens.
     loses = laws is not None or (method.law() is not None and (openings is not None or compiled.scene.has_doors()))
     return State(
         particles.position,
@@ -70,9 +71,9 @@ def state_of(
 
 
 def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], lasts: bool, method: Method) -> None:
-    """Set whether each particle begins a frame in flight, along its walls or at rest; `lasts`: a contact has lasted.
+    """Set the phase of each particle at the start of a frame; `lasts`: a contact has lasted in the run.
 
-    The frame is (its length, in the method's unit, its end [s]). Particles that are not born yet have no phase.
+    `frame` is its length, in the unit of the method, and its end [s]. Particles that are not born yet have no phase.
     """
     span, end = frame
     contacts = state.contacts
@@ -94,9 +95,9 @@ def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], las
 
 
 def _begin_late(left: Floats, remaining: Floats | None, phase: NDArray[np.int8], span: float) -> None:
-    """Mark particles that start at or after the frame's end, with so much of it left, as ARRIVED.
+    """Mark particles that start at or after the end of the frame as ARRIVED; `left` is the frame's rest at a start.
 
-    Particles that start within the frame fly for what is left after their start.
+    Particles that start within the frame fly for the rest of the frame.
     """
     phase[left <= 0.0] = ARRIVED
     late = np.flatnonzero((left < span) & (phase == FLYING))
@@ -106,7 +107,7 @@ def _begin_late(left: Floats, remaining: Floats | None, phase: NDArray[np.int8],
 
 
 def holders_of_resting(contacts: Contacts | None) -> NDArray[np.int64]:
-    """The wall of each particle that rests."""
+    """Return the wall of each particle at rest."""
     if contacts is None:
         return np.zeros(0, np.int64)
     rests = contacts.phase == ARRIVED
@@ -117,7 +118,7 @@ def holders_of_resting(contacts: Contacts | None) -> NDArray[np.int64]:
 def have_lasted(contacts: Contacts | None, phase: NDArray[np.int8]) -> bool:
     """Whether a contact of a run has lasted, or is about to.
 
-    The time that is left of the frame does not tell: a particle that starts within it may have met no wall yet.
+    The rest of the frame is no criterion: a particle that starts within the frame may have met no wall yet.
     """
     if contacts is None:
         return False

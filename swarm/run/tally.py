@@ -14,12 +14,12 @@ from .impacts import Impacts
 from .options import Task
 
 Wholes = NDArray[np.int64]
-# The unit of a sum is a large value of the run over this number: each term is rounded to 2^-52 of that unit.
+# The unit of a sum is a large value of the run over this number; each term is rounded to 2^-52 of this unit.
 _UNITS = 4096.0
 
 
 class Units(NamedTuple):
-    """The units of the sums, powers of two; None where there is no such sum."""
+    """The units of the sums, powers of two; None for a sum that is not kept."""
 
     stays: float | None = None  # [s]
     heats: float | None = None  # [J]
@@ -33,7 +33,7 @@ class Tally:
     """The counts of the threads of a run, and of earlier sessions: sums of whole numbers, exact in any order.
 
     Args:
-        owners: (2, walls): the surface of each wall, and its number in the field or of the part, or -1.
+        owners: (2, walls): the surface of each wall, and its number in a field or of a part, or -1.
         units: the units of the sums.
     """
 
@@ -43,19 +43,19 @@ class Tally:
         self._counts: dict[int, Counts] = {}
 
     def size(self) -> int:
-        """The size of the observables of a frame [bytes]."""
+        """Return the size of the observables of a frame [bytes]."""
         return 8 * self._members * (2 + len(self._summed()))
 
     def counts(self) -> Counts:
-        """The counts of the calling thread."""
+        """Return the counts of the calling thread."""
         return self.of_thread(threading.get_ident())
 
     def of_thread(self, number: int) -> Counts:
-        """The counts of a thread."""
+        """Return the counts of a thread."""
         return self._counts.setdefault(number, self._none())
 
     def _summed(self) -> dict[str, float]:
-        """Name -> unit, of the sums that are kept."""
+        """Return name -> unit of the sums that are kept."""
         return {name: unit for name, unit in self._units._asdict().items() if unit is not None}
 
     def _none(self) -> Counts:
@@ -77,7 +77,7 @@ class Tally:
     # --- Sums of all threads -----------------------------------------------------------------------------
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The arrays of a checkpoint, which `restore` takes."""
+        """Return the arrays of a checkpoint, which `restore` takes."""
         every = [*self._counts.values(), self._none()]
         found = {"member_impacts": np.sum([one.impacts for one in every], axis=0)}
         for name, unit in self._summed().items():
@@ -86,7 +86,7 @@ class Tally:
         return found
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
-        """Go on from the arrays of a checkpoint."""
+        """Set the counts to the arrays of a checkpoint."""
         self._units = Units(**{name: float(arrays[f"member_{name}_unit"][0]) for name in self._summed()})
         self._counts = {}
         mine = self.counts()
@@ -97,7 +97,7 @@ class Tally:
             _carry(sums.whole, sums.rest)
 
     def seen(self, absorbed: Absorbed | None = None, is_shard: bool = False) -> dict[str, NDArray[Any]]:
-        """The observables of all members, surface by surface; in a shard the sums are pairs of whole numbers."""
+        """Return the observables of all members, surface by surface; in a shard sums are pairs of whole numbers."""
         arrays = self.arrays()
         found: dict[str, NDArray[Any]] = {"member_impacts": self._of_members(arrays["member_impacts"])}
         for name, unit in self._summed().items():
@@ -109,14 +109,14 @@ class Tally:
         return found
 
     def _of_members(self, of_walls: Wholes) -> Wholes:
-        """The counts of members, each summed over its walls and images."""
+        """Return the counts of members, each summed over its walls and images."""
         total = np.zeros(self._members, np.int64)
         np.add.at(total, self._places, of_walls)
         return total
 
 
 class Watched(NamedTuple):
-    """The log of impacts and their tally, each None if it is not kept, and the counters."""
+    """The log of impacts and their tally, each None if not kept, and the counters."""
 
     log: Impacts | None = None
     tally: Tally | None = None
@@ -127,12 +127,12 @@ UNWATCHED = Watched()
 
 
 def tally_of(task: Task) -> Tally | None:
-    """The tally of a run, if it has one."""
+    """Return the tally of a run, or None."""
     return Tally(task.compiled.numbering.members, units_of(task)) if task.options.member_impacts else None
 
 
 def units_of(task: Task) -> Units:
-    """The units of the sums of a run."""
+    """Return the units of the sums of a run."""
     laws, (time, heat) = task.compiled.laws, task.scales or scales_of(task)
     are_alone = task.bodies is None and not task.scene.reacts()
     return Units(
@@ -142,9 +142,9 @@ def units_of(task: Task) -> Units:
 
 
 def scales_of(task: Task) -> tuple[float, float]:
-    """The units of times and of heat of a run, from its start and its hottest wall; they do not depend on its end.
+    """Return the units of times and of heat of a run, which depend on its start and its hottest wall, not on its end.
 
-    A time is large if a particle crosses the scene in it, heat if it is the energy of a particle.
+    A large time is that in which a particle crosses the scene, and a large heat the energy of a particle.
     """
     v, mass, gravity = task.particles.velocity, task.particles.mass, task.scene.gravity or (0.0, 0.0, 0.0)
     size = task.scene.finite_size()
@@ -165,7 +165,7 @@ def _power_of_two(large: float) -> float:
 
 
 def value_of(parts: Wholes, unit: float | None) -> NDArray[np.float64]:
-    """The sums [s or J] from their pairs of whole numbers (2, members)."""
+    """Return the sums [s or J] from their pairs of whole numbers (2, members)."""
     assert unit is not None
     whole, rest = parts.copy()
     _carry(whole, rest)
@@ -173,7 +173,7 @@ def value_of(parts: Wholes, unit: float | None) -> NDArray[np.float64]:
 
 
 def _places_of(owners: Wholes) -> tuple[Wholes, int]:
-    """(for each wall the place of its member among all members, surface by surface; the number of members)."""
+    """Return for each wall the place of its member among all members, surface by surface, and the number of members."""
     surface, member = owners[0], np.maximum(owners[1], 0)
     counts = np.zeros(int(surface.max()) + 1, np.int64)
     np.maximum.at(counts, surface, member + 1)

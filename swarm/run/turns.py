@@ -10,12 +10,12 @@ from ..lanes.share import Draws
 from ..state import Contacts
 from .watch import Watch
 
-# So often a particle may go from one kernel to another without time passing. A wedge, a cusp and a chatter stay in the
+# The most turns of a particle from kernel to kernel in which no time passes. A wedge, a cusp and a chatter stay in the
 # kernel of flights; ordinary contacts take two or three such turns.
 MOST = 1000
-# The turn of the first look at particles for which no time passes: few frames have so many turns.
+# The turn of the first look at particles for which no time passes: few frames have this number of turns.
 _FIRST = 10
-# (status, particle, what a halt left in the lanes)
+# (status, particle, the particles that a halt left in the lanes)
 End = tuple[int, int, Halted | None]
 
 
@@ -28,9 +28,9 @@ class Turns:
         self._particles, self._left = np.empty(0, np.int64), np.empty(0)
 
     def end(self, watch: Watch) -> End | None:
-        """The end of the turns, by a halt or by a particle for which no time passes; None: the next turn may begin.
+        """Return the end of the turns, by a halt or a particle for which no time passes; None if they go on.
 
-        Turns count as passes for a halt, as many turns may have few passes each.
+        A turn counts as a pass for a halt, as many turns may have few passes each.
         """
         if watch.is_over(self._count):
             return int(Status.INTERRUPTED), 0, None
@@ -40,7 +40,7 @@ class Turns:
         return None
 
     def _still(self) -> NDArray[np.int64]:
-        """The particles for which no time has passed since the last call, in `MOST` turns.
+        """Return the particles for which no time has passed since the last call, in `MOST` turns.
 
         In each turn every particle that has not arrived goes from one kernel to another, so no kernel can count the
         turns of a particle.
@@ -58,7 +58,7 @@ class Turns:
 
 
 def left_behind(before: Halted, phase: NDArray[np.int8], now: list[Halted]) -> Halted:
-    """The particles that halts have left in lanes: those `now`, and those `before` that no lane has taken since."""
+    """Return the particles that halts left in lanes: those of `now`, and those of `before` that no lane has taken."""
     picked_up = np.concatenate([np.flatnonzero(phase != FLYING), *(remaining.particle for remaining in now)])
     waiting = ~np.isin(before.particle, picked_up)
     parts = [Halted(before.particle[waiting], before.rows[:, waiting]), *now]

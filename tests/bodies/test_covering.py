@@ -49,7 +49,7 @@ def test_mass_and_motion_are_those_of_the_body_without_them():
 def test_points_that_are_given():
     body = swarm.rigid(CUBE + 3.0, 1.0, contacts=[(3.0, 3.0, 2.5), (3.0, 3.0, 3.5)])
     assert (body.contacts @ body.points)[8:] == pytest.approx(np.array([(3.0, 3.0, 2.5), (3.0, 3.0, 3.5)]), abs=1e-14)
-    with pytest.raises(swarm.SceneError, match=r"contacts\[9\] is there already as contacts\[8\]"):
+    with pytest.raises(swarm.SceneError, match=r"contacts\[9\] is listed already as contacts\[8\]"):
         swarm.rigid(CUBE, 1.0, contacts=[(0.0, 0.0, 0.5)] * 2)
 
 

@@ -108,7 +108,9 @@ def test_a_start_from_a_frame_in_which_nobody_is(path, tmp_path):
         f'particles = {{from = "{path}", frame = 0}}\nsurface = [{{kind = "sphere", radius = 9.0}}]\n'
         'method.kind = "impact"\nrun.until = 1.0\n'
     )
-    with pytest.raises(swarm.SceneError, match=r"no particle is there at frame 0 of .*run\.h5; choose a later one"):
+    with pytest.raises(
+        swarm.SceneError, match=r"no particle is in the scene at frame 0 of .*run\.h5; choose a later one"
+    ):
         read(tmp_path / "scene.toml").start()
 
 

@@ -254,7 +254,7 @@ def test_a_frame_with_those_that_come_later_is_no_start():
     """Those that are there are: `born`."""
     rows = np.array([[0.1, np.nan]] * 3)
     some = swarm.Particles.of_frame(rows, rows, np.ones(2), None, np.array([True, False]))
-    with pytest.raises(swarm.SceneError, match=r"particle 1 .*take those that are there: .born\(\)"):
+    with pytest.raises(swarm.SceneError, match=r"particle 1 .*take the particles that are born: .born\(\)"):
         swarm.simulate(SPHERE, some, swarm.Impact(), until=1.0)
     assert len(some.born()) == 1
 

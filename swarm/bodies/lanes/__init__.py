@@ -1,1 +1,1 @@
-"""Lanes of bodies: points that are tied together. Loops over points and ties are outside, over the lanes inside."""
+"""Lanes of bodies: points that are tied together. Outer loops are over points and ties, inner loops over lanes."""

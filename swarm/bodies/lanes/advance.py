@@ -1,4 +1,4 @@
-"""The kernel of bodies: every lane tries its step, is cut where it meets a wall, and is struck there."""
+"""The kernel of bodies: every lane tries a step, which is cut at the time of impact, where the wall strikes."""
 
 import math
 
@@ -17,22 +17,22 @@ from .penalty_contact import SoftContacts
 from .persistent_contact import HardContacts
 from .through import have_ends
 
-# A step longer than the frame that is left by this part is the last of it.
+# The rest of a frame up to which one step covers it, in units of the step.
 _SAME = 1.0 + 1e-9
-# Trials after which a body is stuck: brackets take a hundred at most.
+# The trials after which a body is stuck: a bracket takes a hundred at most.
 _STUCK = 2000
-# A step that is put off more often has no solution.
+# The most times that a step is put off; after these it has no solution.
 _WAITS = 20
-# The forces of contacts that last are guessed from the step before, but each time after so many steps, where a run can
-# be halted: they are not part of its state.
+# The forces of lasting contacts are guessed from the step before, except after each `_AFRESH` steps. There a run can be
+# halted, as these forces are not part of its state.
 _AFRESH = 32
 
 
 @long_kernel
 def advance_bodies(body, walls, rule, state, ticket, size, halt):
-    """Advance all bodies that this thread draws: (status, number of the body).
+    """Advance all bodies that this thread draws; return the status and the number of a body.
 
-    `walls` are the walls of the scene, those with the walls of the body's own guides and cavities after them, and the
+    `walls` are the walls of the scene, the same walls followed by those of the guides and cavities of the body, and the
     openings, or None.
     """
     points, rows, count = state.position.shape[1], state.guess.shape[1], rule.lanes
@@ -94,7 +94,7 @@ def advance_bodies(body, walls, rule, state, ticket, size, halt):
 
 
 def _judge(contacts, i):
-    """The action of a lane after its trial."""
+    """Return the action of a lane after its trial."""
     rule, pace = contacts.rule, contacts.pace
     pace.fresh[i] = False
     if pace.body[i] < 0 or 0 < pace.waits[i] <= _WAITS:
@@ -112,13 +112,13 @@ def _judge(contacts, i):
 
 
 def _finish(contacts, state, i):
-    """After a step, or a blow."""
+    """Book a step, or carry out a blow, and begin the next step of a lane."""
     lanes, pace = contacts.lanes, contacts.pace
     number, action = pace.body[i], pace.action[i]
     if action != impact_time.STRIKE_NOW:
         state.steps[number] += 1
         state.work[number] += pace.work[i]
-        # Brief steps do not count: a body at rest on an elastic wall would bounce by round-off, 10^12 times a step.
+        # Brief steps do not reset the count: a body at rest on an elastic wall would bounce by round-off 10^12 times.
         if pace.step[i] >= BRIEF * contacts.rule.dt:
             pace.stuck[i] = 0
         if contacts.rule.loop:
@@ -138,13 +138,13 @@ def _finish(contacts, state, i):
 
 
 def _begin_step(pace, i):
-    """A lane at the place from which the next step begins."""
+    """Set a lane to the start of a step."""
     pace.fresh[i], pace.whole[i] = True, False
     pace.trial[i], pace.low[i], pace.high[i], pace.wall[i] = 0.0, 0.0, math.inf, -1
 
 
 def _load(contacts, state, i, number):
-    """Take a body into a lane."""
+    """Load a body into a lane."""
     lanes, pace = contacts.lanes, contacts.pace
     pace.body[i], pace.remaining[i], pace.stuck[i] = number, state.remaining[number], 0
     pace.point[i], pace.waits[i] = -1, 0
@@ -159,7 +159,7 @@ def _load(contacts, state, i, number):
 
 
 def _store(contacts, state, i):
-    """Give the body of a lane back, as it is at the start of its step: the lane is free."""
+    """Store the body of a lane as it is at the start of its step, and free the lane."""
     lanes, pace = contacts.lanes, contacts.pace
     number = pace.body[i]
     state.remaining[number] = pace.remaining[i]
@@ -174,7 +174,7 @@ def _store(contacts, state, i):
 
 
 def _stop(contacts, state):
-    """Give back the bodies that go on with the same bits from their positions and velocities alone."""
+    """Store the bodies that can go on with the same bits from their positions and velocities alone."""
     pace = contacts.pace
     for i in range(pace.body.size):
         number = pace.body[i]
@@ -186,7 +186,7 @@ def _stop(contacts, state):
 
 
 def _try(contacts, state):
-    """The step of every lane, to r1 and v1."""
+    """Compute the step of every lane, to r1 and v1."""
     rule, lanes, pace = contacts.rule, contacts.lanes, contacts.pace
     count, stages, elapsed = pace.h.size, rule.stages.size, 0.0
     _begin_trial(contacts, state)
@@ -194,7 +194,7 @@ def _try(contacts, state):
         part, ends = rule.stages[stage], stage == stages - 1
         for a in range(lanes.f.shape[0]):
             for i in range(count):
-                # Exact for what grows steadily, and for round-off, which alternates from step to step.
+                # This guess is exact for linear growth, and for round-off that alternates from step to step.
                 more = lanes.before[a, i] - lanes.older[a, i]
                 share = 0.5 + 0.5 * pace.step[i] / rule.dt
                 known = (stages == 1) & (more == more)
@@ -228,7 +228,7 @@ def _try(contacts, state):
 
 
 def _begin_trial(contacts, state):
-    """The lengths of the steps of a trial, and the start of its first stage."""
+    """Set the lengths of the steps of a trial, and the start of its first stage."""
     rule, lanes, pace = contacts.rule, contacts.lanes, contacts.pace
     for i in range(pace.h.size):
         whole = select(pace.remaining[i] <= _SAME * rule.dt, pace.remaining[i], rule.dt)
@@ -249,7 +249,7 @@ def _begin_trial(contacts, state):
 
 
 def _look(contacts, scene, c):
-    """Which lanes end with a point outside; c is room for the places of one point."""
+    """Find the lanes that end with a point outside; c is room for the places of one point."""
     touching, r1, pace = contacts.touching, contacts.lanes.r1, contacts.pace
     count = pace.out.size
     for i in range(count):
@@ -274,7 +274,7 @@ def _look(contacts, scene, c):
             for i in range(count):
                 if pace.body[i] >= 0 and not pace.out[i] and not contacts.is_free(k, i):
                     pace.out[i] = contacts.passed(k, column(c, 0, i), contacts.rule.room, i).wall >= 0.0
-    # Cavities that points carry are checked one by one. Each has one surface, never a wall of thousands of bodies.
+    # Cavities that points carry are checked one by one: each has one surface, never thousands of walls.
     for k in range(touching.points + touching.guides, touching.plain.size):
         wall = float(touching.walls + k - touching.points)
         for i in range(count):
@@ -282,7 +282,7 @@ def _look(contacts, scene, c):
 
 
 def _commit(contacts, state):
-    """Take the trial as the step where it is one."""
+    """Make the trial the step in lanes with the action COMMIT or STRIKE."""
     if state.watchers.counters is not None:
         following.count_steps(contacts, state)
     lanes, pace, count = contacts.lanes, contacts.pace, contacts.pace.out.size
@@ -295,7 +295,7 @@ def _commit(contacts, state):
             lanes.r[row, i] = select(pace.done[i], lanes.r1[row, i], lanes.r[row, i])
             lanes.v[row, i] = select(pace.done[i], lanes.v1[row, i], lanes.v[row, i])
     for i in range(count):
-        # In a short step round-off over h^2 is all that a multiplier is.
+        # The multiplier of a short step is nothing but round-off over h^2.
         pace.done[i] = pace.done[i] & (pace.step[i] > impact.SHORT * contacts.rule.dt)
     for a in range(lanes.f.shape[0]):
         for i in range(count):

@@ -20,43 +20,43 @@ class Ties(NamedTuple):
     """
 
     ends: Any  # (L, 2) the points a, b
-    links: int  # how many of the rows are rigid
-    springs: int  # how many are springs, or links that multipliers hold
-    relaxed: int  # how many of these are such links, which come after the springs
+    links: int  # the number of rigid rows
+    springs: int  # the number of springs, and of links that multipliers hold
+    relaxed: int  # the number of these links, which come after the springs
     rest: Any  # (L,) |y|^2 of a link and of an edge without stress, the rest length of a spring
-    stiffness: Any  # (L,) of springs
+    stiffness: Any  # (L,) the stiffness of springs
     give: Any  # (L,) 8 l^2/alpha of relaxed links
     compliance: Any  # (E, E) 2/K of the edges
     start: Any  # (L + G,) the first column of each row of the system that is not 0; guides come after the ties
-    inverse_mass: Any  # (P, P) W = 1/M, without rows and columns of points that are fixed
+    inverse_mass: Any  # (P, P) W = 1/M, without rows and columns of fixed points
     mass: Any  # (P, P) M
     is_diagonal: bool
     is_free: Any  # (P,) whether a point can move
     led: Any  # (P,) the row of its path, -1 for a point that is not led
-    couplings: Any  # (L + K + G + C, the same) b W b of ties, where b is +1 at a and -1 at b, then of contact points
+    couplings: Any  # (L + K + G + C, L + K + G + C) b W b of ties, with b = +1 at a and -1 at b, then of contact points
 
 
 class Touching(NamedTuple):
-    """The points that may touch walls, and what walls do to them.
+    """The points that may touch walls, and the restitution, friction and laws of the walls.
 
-    First K contact points, which meet every wall of the scene; then G points in guides and C in cavities that a point
-    carries, each at a surface of its own, the walls after those of the scene.
+    First come K contact points, which meet every wall of the scene, then G guided points, and C points in cavities that
+    a point carries. The surfaces of guides and cavities are walls with numbers after those of the scene.
     """
 
-    coefficients: Any  # (K + G + C, P) b of c = sum b_p r_p; of a cavity relative to its carrier
-    plain: Any  # (K + G + C,) the base point that it is, -1 for a combination of several
+    coefficients: Any  # (K + G + C, P) b of c = sum b_p r_p; in a cavity relative to its carrier
+    plain: Any  # (K + G + C,) the number of the base point, -1 for a combination of several
     reach: Any  # (K + G + C, P) W b
     points: int  # K
-    walls: int  # of the scene
+    walls: int  # the number of walls of the scene
     guides: int  # G
     restitution: Any  # (walls + G + C,)
     friction: Any  # (walls + G + C,)
-    is_dissipative: bool  # whether any wall is
-    laws: Any = None  # `Laws` of the walls of the scene where one sends bodies off
-    random: Any = None  # and `RandomSource` of these
+    is_dissipative: bool  # whether any wall takes energy
+    laws: Any = None  # the `Laws` of the walls of the scene if one sends bodies off
+    random: Any = None  # the `RandomSource` of these laws
 
     def place(self, r, k, i):
-        """The place of contact point k of a lane, or with velocities its velocity."""
+        """The place of contact point k of a lane, or its velocity if r has velocities."""
         q = self.plain[k]
         if q >= 0:
             return column(r, 3 * q, i)
@@ -66,7 +66,7 @@ class Touching(NamedTuple):
         return c
 
     def span(self, k):
-        """The walls that a contact point can meet: from the first to the one before the last."""
+        """The walls that a contact point can meet: from `first` to before `last`."""
         own = k - self.points
         first = 0 if own < 0 else self.walls + own
         last = self.walls if own < 0 else first + (1 if own >= self.guides else 0)
@@ -84,7 +84,7 @@ class Touching(NamedTuple):
         return takes
 
     def width(self, name, found):
-        """The number of directions of each contact: the normal, or the tangents too, where there is friction."""
+        """The number of directions of each contact: 1, the normal, or 3, with tangents, if there is friction."""
         rough = False
         for a in range(found):
             rough = rough or self.friction[name[a, 1]] > 0.0
@@ -97,76 +97,76 @@ class StepRule(NamedTuple):
     dt: float
     stages: Any  # (S,) lengths of the stages of a composed step, in units of the step
     gravity: Any  # (3,)
-    end: float  # of the frame [s]
+    end: float  # the end of the frame [s]
     room: float  # round-off of a position on a wall [m]
-    noise: float  # round-off of |y|^2 of the shortest tie, relative
-    lanes: int  # how many bodies at once
-    walls: Any  # None: they are rigid and strike; `Soft`: they are springs
-    most: int  # contacts of a body at once
+    noise: float  # relative round-off of |y|^2 of the shortest tie
+    lanes: int  # the number of bodies in lanes
+    walls: Any  # None for rigid walls, else `Soft`
+    most: int  # the most contacts of a body at a time
     loop: bool  # whether multipliers are found by Uzawa's loop
-    strict: bool  # whether one that does not converge ends the run
-    period: Any = None  # `Period` of the cell, where the scene repeats
+    strict: bool  # whether a loop that does not converge ends the run
+    period: Any = None  # `Period` of the cell, or None
 
 
 class BodyState(NamedTuple):
-    """All copies."""
+    """The state of all copies."""
 
     position: Any  # (3, P, n)
     velocity: Any  # (3, P, n)
-    remaining: Any  # (n,) of the frame [s]
+    remaining: Any  # (n,) the rest of the frame [s]
     guess: Any  # (3, L + G, n) multipliers of the last three steps, NaN until the first step after a blow
-    path: Any  # (A, 13, n) of led points: start, velocity, cosine, sine, rate
-    short: Any  # (n,) short steps between impacts, one after the other
+    path: Any  # (A, 13, n) the paths of led points: start, velocity, cosine, sine, rate
+    short: Any  # (n,) consecutive short steps between impacts
     lasting: Any  # (n,) int8, whether a contact lasts
     impacts: Any  # (n,)
     impulse: Any  # (walls, n) [N s]
     dissipated: Any  # (n,) [J]
-    work: Any  # (n,) of led points on what is tied to them, and of walls that move [J]
+    work: Any  # (n,) of led points on the body, and of moving walls [J]
     sliding: Any  # (n,) [s]
     steps: Any  # (n,)
     sweeps: Any  # (n,) of Uzawa's loop
-    unconverged: Any  # (n,) steps with a loop that did not
+    unconverged: Any  # (n,) steps with a loop that did not converge
     energy: Any  # (n,) at the start of the run [J]
     free: Any = None  # (K, n) int8, whether a contact point has passed an opening; None without openings
-    escape_time: Any = None  # (n,) when the last one of a body has [s], NaN of bodies that are inside
-    wall_work: Any = None  # (walls, n) of each wall [J], a part of `work`; None where none moves
-    heat: Any = None  # (walls, n) that each wall gave by its laws [J], a part of `work`; None where none gives any
-    absorbed_time: Any = None  # (n,) when a wall absorbed each body [s], NaN of the others; None where none does
-    absorbed_wall: Any = None  # (n,) int32, the number of that wall, -1 of the others
-    # What observes impacts and steps, and what counters write to:
+    escape_time: Any = None  # (n,) when the last contact point of a body had passed [s], NaN of bodies inside
+    wall_work: Any = None  # (walls, n) the work of each wall [J], a part of `work`; None if no wall moves
+    heat: Any = None  # (walls, n) the heat given by laws [J], a part of `work`; None if no law gives heat
+    absorbed_time: Any = None  # (n,) when a wall absorbed each body [s], NaN of others; None if no wall absorbs
+    absorbed_wall: Any = None  # (n,) int32, the number of this wall, -1 of other bodies
+    # The observers of impacts and steps, and the arrays of counters:
     watchers: Any = Watchers()  # of the thread
-    mass: Any = None  # (n,) of each body [kg]
-    crossed: Any = None  # `Crossed`, where there are counters
-    image: Any = None  # (3, n) how many cells away each body is, where the scene repeats
+    mass: Any = None  # (n,) the mass of each body [kg]
+    crossed: Any = None  # `Crossed`, or None without counters
+    image: Any = None  # (3, n) the cell of each body, or None
 
     def count_impact(self, number, wall):
-        """Count an impact of a body on a wall that is a spring."""
+        """Count an impact of a body on a soft wall."""
         self.impacts[number] += 1
         if self.watchers.counts is not None:
             self.watchers.counts.add(wall, 1)
 
 
 class BodyLanes(NamedTuple):
-    """The bodies that a thread advances at once: three rows for each point, and for each tie and guide."""
+    """The lanes of a thread, one body each: arrays with three rows for each point, and for each tie and guide."""
 
     r: Any  # (3 P, B) at the start of the step
     v: Any
     ra: Any  # at the start of the stage
     va: Any
-    p: Any  # where the stage would end without ties
-    r1: Any  # at its end
+    p: Any  # the end of the stage without ties
+    r1: Any  # at the end of the stage
     v1: Any
     force: Any  # (3 P, B) deceleration by the ties
     y0: Any  # (3 M, B) of every tie and guide, M = L + G, at the start of the stage
-    y1: Any
+    y1: Any  # at its end
     d: Any  # discrete gradient: y0 + y1 of |y|^2, a unit vector of a guide
     a: Any  # (M, M, B) system of the multipliers, factored
-    f: Any  # (M, B) its right side
-    soft: Any  # (M, B) of springs and relaxed links: its diagonal
+    f: Any  # (M, B) the right side of the system
+    soft: Any  # (M, B) the diagonal of springs and relaxed links
     multiplier: Any  # (M, B)
     recent: Any  # (M, B) multipliers of the last step
-    before: Any  # (M, B) of the one before
-    older: Any  # (M, B) and before that; NaN: no step since the last blow
+    before: Any  # (M, B) multipliers of the last step but one
+    older: Any  # (M, B) multipliers of the step before; NaN if there was no step since the last blow
     offset: Any  # (M or 0, B) 4 l lambda/alpha of relaxed links
 
 
@@ -177,43 +177,43 @@ def shapes_of_lanes(points, rows, offsets, count):
 
 
 class LaneNumbers(NamedTuple):
-    """Numbers of each lane, (B,)."""
+    """The numbers of each lane, (B,)."""
 
-    remaining: Floats  # of the frame [s]
+    remaining: Floats  # the rest of the frame [s]
     step: Floats  # the step that is tried [s]
-    h: Floats  # of the stage [s]
-    begun: Floats  # of the step, before the stage [s]
-    error: Floats
-    lag: Floats  # by how much D changed when it followed last: the sum of squares [m^2]
-    previous: Floats  # error
-    rate: Floats
-    residue: Floats  # of the equations of ties and guides, in units of round-off
-    unsettled: Floats  # of those of contacts too
-    trial: Floats  # length to try [s]; 0: a whole step
-    low: Floats  # bracket of the time of impact [s]
-    high: Floats
-    inside: Floats  # gap of the bracket's lower end [m], by how much the worst contact is inside
-    outside: Floats  # and of its upper end
-    done: Flags  # the ties of this stage are solved, or put off
-    last: Flags  # after this correction
-    solved: Flags  # of all stages
-    out: Flags  # a point is outside
-    body: Counts  # number of the body, -1 for none
+    h: Floats  # the length of the stage [s]
+    begun: Floats  # the part of the step before the stage [s]
+    error: Floats  # the largest error of a tie
+    lag: Floats  # the sum of squares of the last change of D [m^2]
+    previous: Floats  # the error before the last correction
+    rate: Floats  # the estimate by which a correction shrinks the error
+    residue: Floats  # the error of the equations of ties and guides, in units of round-off
+    unsettled: Floats  # the same error with the equations of contacts
+    trial: Floats  # the length to try [s]; 0: a whole step
+    low: Floats  # the lower end of the bracket of the time of impact [s]
+    high: Floats  # its upper end [s]
+    inside: Floats  # the largest gap of a contact at the lower end of the bracket [m], below 0
+    outside: Floats  # the largest gap at its upper end [m]
+    done: Flags  # whether the ties of this stage are solved, or put off
+    last: Flags  # whether they are after this correction
+    solved: Flags  # whether the ties of all stages are
+    out: Flags  # whether a point is outside
+    body: Counts  # the number of the body, -1 for none
     point: Counts  # the point of the impact, -1 for none
-    wall: Counts
-    stuck: Counts  # trials since the last step
-    action: Counts
-    lasts: Flags  # a contact lasts
-    active: Counts  # contacts that do
-    fresh: Flags  # the step begins
-    whole: Flags  # the step is one stage
-    work: Floats  # of led points and of walls that move in the step [J]
+    wall: Counts  # the wall of the impact, -1 for none
+    stuck: Counts  # the trials since the last step
+    action: Counts  # the action after the trial, see impact_time.py
+    lasts: Flags  # whether a contact lasts
+    active: Counts  # the number of lasting contacts
+    fresh: Flags  # whether the step begins
+    whole: Flags  # whether the step is one stage
+    work: Floats  # the work of led points and of moving walls in the step [J]
     waits: Counts  # how often the solution of this step was put off to the next pass
-    turns: Counts  # sweeps of Uzawa's loop in this step
-    ease: Floats  # by how much its penalty is softer than that of this step: a short one needs a stiffer one
-    loops: Flags  # it goes on
-    loose: Flags  # it ended above its tolerance
-    brief: Flags  # no force acts in this step, see sticking.py
+    turns: Counts  # the sweeps of Uzawa's loop in this step
+    ease: Floats  # the inverse penalty relative to that of a whole step, as a short step needs a stiffer penalty
+    loops: Flags  # whether the loop goes on
+    loose: Flags  # whether the loop ended above its tolerance
+    brief: Flags  # whether no force acts in this step, see sticking.py
 
 
 # The type of each array of `LaneNumbers`.
@@ -223,17 +223,17 @@ PACES = tuple(
 
 
 class HeldContacts(NamedTuple):
-    """The contacts of each lane that last, at most C of them; of walls that are springs all."""
+    """The lasting contacts of each lane, at most C of them; with soft walls all contacts."""
 
     name: Counts  # (B, C, 2) point and wall
-    frame: Floats  # (B, 2 C, 3, 3) normal and two tangents; behind them those with which every trial of a step begins
-    press: Floats  # (B, 6 C) force along each [N], and likewise; more arrays make a step 1.4 times as long
-    before: Floats  # (B, 3 C) and in the step before, NaN if that step had other contacts
-    impulse: Floats  # (B, C) of the step [N s]
-    work: Floats  # (B, C) of its wall in the step [J]
-    stages: Counts  # (B, C) in how many stages of the step it pushes
-    lost: Floats  # (B,) to friction in the step [J]
-    multiplier: Floats  # (B, C) lambda of walls that are springs
+    frame: Floats  # (B, 2 C, 3, 3) normal and two tangents, then those with which every trial of a step begins
+    press: Floats  # (B, 6 C) force along each direction [N], in the same order; more arrays take 1.4 times as long
+    before: Floats  # (B, 3 C) forces of the step before, NaN if that step had other contacts
+    impulse: Floats  # (B, C) impulse of the step [N s]
+    work: Floats  # (B, C) work of the wall in the step [J]
+    stages: Counts  # (B, C) the number of stages of the step in which the contact pushes
+    lost: Floats  # (B,) energy lost to friction in the step [J]
+    multiplier: Floats  # (B, C) lambda of soft walls
 
 
 def arrays_of_held(lanes, most):

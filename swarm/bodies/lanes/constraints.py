@@ -1,15 +1,15 @@
-"""Ties and guides: the equations of their multipliers in one stage of a step, in all lanes at once.
+"""Ties and guides: the equations of their multipliers in one stage of a step, in all lanes together.
 
     r1 = p - (h^2/2) W sum lambda D,  v1 = v0 + h G - h W sum lambda D,  p = r0 + h v0 + h^2 G/2
-with D = y0 + y1, the discrete gradient of |y|^2 of each tie (a quadratic, so it is exact), and for every tie
+with D = y0 + y1, the discrete gradient of |y|^2 of each tie (exact, as |y|^2 is quadratic), and for every tie
     link     |y1|^2 = l^2
     spring   lambda = k (1 - 2 l/(|y0| + |y1|))/2, the composite discrete gradient of k (|y| - l)^2/2
     edges    lambda = K ((|y0|^2 + |y1|^2)/2 - s0)
     relaxed  alpha (c0 + c1)/2 + lambda' of the link c = (|y|^2 - l^2)/(2 l) along its discrete gradient D/(2 l): an
-             edge with K = alpha/(4 l^2), and 4 l lambda'/alpha more on the left
+             edge with K = alpha/(4 l^2), and a further term 4 l lambda'/alpha on the left
     guide    D.(q1 - q0) + gap of q0 = 0 of its point q, D the discrete gradient of the gap
-so that links do no work and what springs and edges do is the change of their energy, exactly. v1 in this form, because
-2 (r1 - r0)/h - v0 cancels: 3e-10 instead of 1e-15.
+    so that links do no work, and the work of springs and edges is exactly the change of their energy. v1 has this form
+    because 2 (r1 - r0)/h - v0 cancels: its error is 3e-10 instead of 1e-15.
 """
 
 import math
@@ -21,17 +21,18 @@ from ...kernel.vector import column, dot, put, square
 from ...surfaces.in_motion.moving import Carried
 from .body_arrays import BodyLanes, HeldContacts, LaneNumbers, StepRule, Ties, Touching
 
-# Where the relative error of |y|^2 would be below this after a correction, it is the last.
+# A correction is the last one if the relative error of |y|^2 after it is expected below this.
 _TOLERANCE = 1e-15
-# By how much a correction shrinks the error: this times h^2 W lambda, over neighbours of ties too.
+# A correction shrinks the error by this times h^2 W lambda, which includes the neighbours of ties.
 _NEGLECTED = 4.0
-# By how much D may still change, in units of round-off of a place.
+# The last change of D, in units of round-off of a place.
 _SETTLED = 64.0
-# A tie under pressure makes the first guess of D longer; at most by 1 over this.
+# A tie under pressure makes the first guess of D longer, at most by the inverse of this factor.
 _LEAST = 0.5
-# What a first correction is trusted with: D lags behind it, and what D is off by is missing in the energy.
+# The least factor by which a first correction is expected to shrink the error: D lags behind it, and an error of D is
+# missing in the energy.
 _AT_FIRST = 1e-3
-# The rest length that scales the equation of a spring is at least this part of its length.
+# The least rest length that scales the equation of a spring, as a part of its length.
 _SHORTEST = 1e-8
 
 
@@ -71,7 +72,7 @@ class Constrained(Record):
         return isinstance(self.walls, Carried)
 
     def launch(self):
-        """The end p of the stage without ties, and D for that."""
+        """Compute the end p of the stage without ties, and D for it."""
         ties, lanes, pace = self.ties, self.lanes, self.pace
         count = pace.h.size
         for row in range(lanes.p.shape[0]):
@@ -94,14 +95,14 @@ class Constrained(Record):
                 for i in range(count):
                     y = lanes.ra[first + x, i] - lanes.ra[second + x, i]
                     lanes.y0[3 * a + x, i] = y
-                    # One tie alone is this much shorter, exactly. Of several, each made shorter by its own would turn
-                    # the forces between them: 1e-13 of the angular momentum a step, where all as they are leave its
+                    # For a single tie this factor is exact. With several ties, a factor for each would turn the forces
+                    # between them, and change 1e-13 of the angular momentum a step; without factors it changes by
                     # round-off.
                     d = (y + (lanes.p[first + x, i] - lanes.p[second + x, i])) * pace.rate[i]
                     lanes.d[3 * a + x, i] = select(pace.waits[i] > 0, lanes.d[3 * a + x, i], d)
 
     def arrive(self):
-        """v1 = v0 + h G - h W sum lambda D"""
+        """Compute v1 = v0 + h G - h W sum lambda D."""
         lanes, pace = self.lanes, self.pace
         for row in range(lanes.v1.shape[0]):
             if self.ties.is_free[row // 3]:
@@ -110,7 +111,7 @@ class Constrained(Record):
                     lanes.v1[row, i] = lanes.va[row, i] + pace.h[i] * (g - lanes.force[row, i])
 
     def move(self):
-        """r1 = p - (h^2/2) of the deceleration"""
+        """Compute r1 = p - (h^2/2) times the deceleration."""
         lanes, pace = self.lanes, self.pace
         for row in range(lanes.r1.shape[0]):
             for i in range(pace.h.size):
@@ -118,9 +119,9 @@ class Constrained(Record):
                 lanes.r1[row, i] = lanes.p[row, i] - k2 * lanes.force[row, i]
 
     def follow(self):
-        """D = y0 + y1
+        """Compute D = y0 + y1.
 
-        In a lane that is done D stays as it is: with the multipliers, which stay too, it gives the same r1 again.
+        A lane that is done keeps D: with its multipliers, which are kept too, D gives the same r1 again.
         """
         ties, lanes, pace = self.ties, self.lanes, self.pace
         for i in range(pace.h.size):
@@ -135,7 +136,7 @@ class Constrained(Record):
                     lanes.d[3 * a + x, i] = select(pace.done[i], lanes.d[3 * a + x, i], d)
 
     def accelerate(self):
-        """W sum lambda D, the deceleration by the ties."""
+        """Compute W sum lambda D, the deceleration by the ties."""
         ties, lanes, count = self.ties, self.lanes, self.pace.h.size
         force, rows = lanes.force, lanes.force.shape[0]
         for row in range(rows):
@@ -154,7 +155,7 @@ class Constrained(Record):
                 for i in range(count):
                     force[row, i] *= w
             return
-        # v1 of points that are not free is their path's.
+        # v1 has room for the product, except at points that are not free: there it is the velocity of their path.
         for row in range(rows):
             q = row // 3
             if ties.is_free[q]:
@@ -172,7 +173,7 @@ class Constrained(Record):
     # --- Newton's method
 
     def residual(self, turn):
-        """The residual of each tie, as an error of |y1|^2; which lanes need one correction at most."""
+        """Compute the residual of each tie, an error of |y1|^2; decide which lanes need at most one correction."""
         ties, lanes, pace = self.ties, self.lanes, self.pace
         f, count, rows = lanes.f, pace.h.size, ties.ends.shape[0]
         links, soft = ties.links, ties.links + ties.springs
@@ -199,7 +200,7 @@ class Constrained(Record):
                     after = math.sqrt(f[a, i])
                     both = math.sqrt(square(column(lanes.y0, 3 * a, i))) + after
                     short = select(rest > _SHORTEST * both, rest, _SHORTEST * both)
-                    # The equation times this has the derivative 1 by |y1|^2.
+                    # The factor with which the equation has the derivative 1 by |y1|^2.
                     scale = both * both * after / short
                     unmet = 1.0 - 2.0 * rest / both - softness * lanes.multiplier[a, i]
                     f[a, i] = scale * unmet
@@ -222,32 +223,32 @@ class Constrained(Record):
                 for i in range(count):
                     _worse(pace.error, i, abs(f[a, i]) * inverse)
             for i in range(count):
-                # What the correction neglects: that D changes with r1
+                # The correction neglects that D changes with r1.
                 k2 = _NEGLECTED * pace.h[i] * pace.h[i]
                 _worse(pace.rate, i, abs(k2 * ties.couplings[a, a] * lanes.multiplier[a, i]))
         self._decide(links == rows, turn)
 
     def _decide(self, is_rigid, turn):
-        """Which lanes need no more than one correction; `is_rigid`: no tie of the body changes its length."""
+        """Decide which lanes need at most one correction; `is_rigid` says that all ties of the body are links."""
         pace, room = self.pace, _SETTLED * self.rule.room
         for i in range(pace.error.size):
             error, before = pace.error[i], pace.previous[i]
-            # In a pass that goes on D has followed twice since: the ratio says too little.
+            # In a continued pass D has followed twice since the last error, so that the ratio of errors is too small.
             rate = select(pace.waits[i] == 0, 0.0, error / before)
             rate = select(turn > 0, error / before, select(rate > _AT_FIRST, rate, _AT_FIRST))
-            # Of slow turns what D lags behind is along D, where it does no work, but for ties of a length that changes.
+            # In slow turns the lag of D is along D, where it does no work unless ties change their lengths.
             turned = select((pace.rate[i] < 1.0) & is_rigid, pace.rate[i], 1.0)
             counts = turned * turned * turned * turned
             rate = select(rate > pace.rate[i], rate, pace.rate[i])
-            # What is put off goes on from here in the next pass, however many corrections its neighbours take in this
-            # one.
+            # A lane that is put off goes on from here in the next pass, however many corrections its neighbours take in
+            # this pass.
             pace.previous[i] = select(pace.done[i], before, error)
-            # A turn by 1 in a step can meet the lengths with a D that is far off, and loses 2e-8 of the energy.
+            # A turn by 1 rad in a step can satisfy the lengths with a wrong D, and loses 2e-8 of the energy.
             settled = counts * counts * pace.lag[i] <= room * room
             pace.last[i] = settled & ((error * rate <= _TOLERANCE) | (error <= self.rule.noise))
 
     def assemble(self):
-        """The derivative of each equation by each multiplier, h^2 (beta W beta) y1.D, within the skyline."""
+        """Compute the derivative of each equation by each multiplier, h^2 (beta W beta) y1.D, within the skyline."""
         ties, lanes, h, count = self.ties, self.lanes, self.pace.h, self.pace.h.size
         a, y, d, links, soft = lanes.a, lanes.y1, lanes.d, ties.links, ties.links + ties.springs
         for row in range(ties.ends.shape[0]):
@@ -274,11 +275,11 @@ class Constrained(Record):
         for i in range(pace.h.size):
             pace.done[i] = pace.done[i] | pace.last[i]
 
-    # --- Guides: their rows come after those of ties
+    # --- Guides: their rows come after the rows of ties
 
     @outlined
     def turn_guides(self, i, r1):
-        """Directions of guides: the discrete gradient of each gap from the start of the stage to r1."""
+        """Set the directions of guides: the discrete gradient of each gap from the start of the stage to r1."""
         touching = self.touching
         for g in range(touching.guides):
             k, row = touching.points + g, self.ties.ends.shape[0] + g
@@ -287,7 +288,7 @@ class Constrained(Record):
 
     @outlined
     def guide(self, i):
-        """The equations of the guides of a lane."""
+        """Set up the equations of the guides of a lane."""
         ties, touching, lanes, h = self.ties, self.touching, self.lanes, self.pace.h
         half = 0.5 * h[i] * h[i]
         for g in range(touching.guides):
@@ -307,7 +308,7 @@ class Constrained(Record):
         return row if row < self.ties.ends.shape[0] else row + self.touching.points
 
     def slope(self, row, i):
-        """The derivative of the equation of a tie, |y1|^2, or guide by its end."""
+        """The derivative of the equation of a tie, |y1|^2, or of a guide, by its end."""
         return (2.0 if row < self.ties.ends.shape[0] else 1.0) * column(self.lanes.y1, 3 * row, i)
 
     def worst(self, i):
@@ -319,6 +320,6 @@ class Constrained(Record):
 
 
 def _worse(worst, i, value):
-    """Keep the larger one; NaN counts as infinite."""
+    """Keep the larger error; NaN counts as infinite."""
     value = select(value < math.inf, value, math.inf)
     worst[i] = select(value > worst[i], value, worst[i])

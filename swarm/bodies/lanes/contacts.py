@@ -1,6 +1,6 @@
-"""The contacts of a body: which walls its points can meet, which are at one, and what their forces do to the ties.
+"""The contacts of a body: the walls that its points can meet, the contacts at walls, and their effect on ties.
 
-The contacts with rigid walls are in persistent_contact.py, those with springs in penalty_contact.py.
+Contacts with rigid walls are in persistent_contact.py, contacts with soft walls in penalty_contact.py.
 """
 
 import math
@@ -13,29 +13,29 @@ from .constraints import Constrained
 from .passages import BEHIND, OUT
 from .through import WayThrough, have_ends, is_of_ends, passed
 
-# A contact this many times round-off away from its wall is at it.
+# The distance at which a contact is at its wall, in units of round-off.
 NEAR = 64.0
-# Most contacts at one instant; more follow in the next blow at the same instant.
+# The most contacts of a blow; more contacts follow in the next blow at the same instant.
 MOST_CONTACTS = 16
-# How far outside a contact that lasts may end, in units of round-off.
+# The distance outside at which a lasting contact may end, in units of round-off.
 ROOM = 64.0
-# A contact point that starts farther outside of a wall that ends, in these units, is behind it.
+# The distance outside of a wall with edges at which a contact point is behind it, in units of round-off.
 _AT = 4.0 * ROOM
 
 
 class BodyContacts(Constrained):
-    """The contacts of a pass, by the kind of its walls."""
+    """The contacts of a pass; there is one class for each kind of walls."""
 
     def begin(self, i):
-        """The contacts of a lane at the start of a trial, and how they press."""
+        """Set the contacts of a lane at the start of a trial, and their first forces."""
         raise NotImplementedError
 
     def turn(self, i, r1):
-        """Directions of the contacts of a lane: the discrete gradient of each gap from the start of the stage to r1."""
+        """Set the directions of contacts of a lane: discrete gradients of gaps from the start of the stage to r1."""
         raise NotImplementedError
 
     def correct(self, i, number):
-        """Correct the forces of contacts, and for it f, the corrections of ties and guides; whether it is the last."""
+        """Correct the forces of contacts, and f, the corrections of ties and guides; set `pace.last`."""
         raise NotImplementedError
 
     def gap_gradient(self, wall, y, i):
@@ -46,35 +46,35 @@ class BodyContacts(Constrained):
         """Begin Uzawa's loop of a stage in all lanes."""
 
     def again(self):
-        """Update the multipliers of lanes with a loop that goes on; count these; the stage of the others is done."""
+        """Update the multipliers of lanes with a loop that goes on; return their number. Others end the stage."""
         return 0
 
     def judge(self, i):
-        """The action of a lane with a trial that ends outside, has no solution, or looks for the time of an impact."""
+        """Return the action of a lane after a trial that ends outside, has no solution, or seeks a time of impact."""
         raise NotImplementedError
 
     def end(self, state, i):
-        """Book the impulses of the walls in a step; whether contacts last."""
+        """Book the impulses of the walls in a step, and set whether contacts last."""
         raise NotImplementedError
 
     def strike(self, state, i):
-        """An impact at this instant; contacts may last from there."""
+        """Carry out an impact at this instant; contacts may last from there on."""
         raise NotImplementedError
 
     def send_off(self, state, name, frame, found, i):
-        """Send a body off by a law of a wall at one of these contacts, which approach; whether one acts."""
+        """Send a body off by a law of a wall at one of these approaching contacts; return whether a law acts."""
         return False
 
-    # --- In a cell that repeats
+    # --- In a periodic cell
 
     def in_cell(self, k, c, by):
-        """A place of contact point k, moved as `by` is into the cell: its walls are those of a place in the cell."""
+        """A place of contact point k, moved by the shift that brings `by` into the cell, where the walls are."""
         if self.rule.period is None:
             return c
         return c if k >= self.touching.points else moved_into(self.rule.period, c, by)
 
     def spot(self, r, k, i):
-        """The place of contact point k of a lane among the walls: it is moved as at the start of the step."""
+        """The place of contact point k of a lane among the walls, moved into the cell as at the start of the step."""
         c = self.touching.place(r, k, i)
         if self.rule.period is None:
             return c
@@ -101,7 +101,7 @@ class BodyContacts(Constrained):
                         put(lanes.force, 3 * q, i, column(lanes.force, 3 * q, i) + f)
 
     def eliminate(self, wide, systems, i):
-        """Leave the contacts alone: schur, and gap without what the corrections of ties and guides do to it."""
+        """Eliminate ties and guides: compute schur, and gap minus the effect of their corrections."""
         along, across, schur, gap = systems
         ties, lanes, name, frame = self.ties, self.lanes, self.active.name[i], self.active.frame[i]
         m, rows, count = lanes.f.shape[0], schur.shape[0], ties.ends.shape[0]
@@ -146,33 +146,33 @@ class BodyContacts(Constrained):
                 along = away
             for d in range(1, 3):
                 active.lost[i] += active.press[i, 3 * a + d] * dot(direction(frame, a, d), along)
-            # What a force does over the round-off of a gap; over more it is an error to be seen.
+            # The work of a force over the round-off of a gap counts as lost; over more it is an error that must show.
             closer = dot(direction(frame, a, 0), away)
             if touching.dissipates(active.name[i, a, 1]) and abs(closer) <= 2.0 * ROOM * self.rule.room:
                 active.lost[i] += press * closer
 
     def carried(self, wall, y0, y1, i):
-        """By how much a wall moves a contact in the stage: what is on it, and its surface where it changes."""
+        """The displacement in the stage of the material of a wall at a contact, and of its surface."""
         over, h = self.walls_between(i), self.pace.h[i]
         return over.carry(float(wall), y0) - y0, h * over.mean_velocity(float(wall), y0, y1, h)
 
     def slip(self, walls, wall, c, u):
-        """The velocity of a contact at a place relative to its wall."""
+        """The velocity of a contact at a place, relative to its wall."""
         return u - walls.velocity(float(wall), c) if self.walls_move() else u
 
     def fastest(self, u, slip):
-        """A speed that the round-off of a velocity relative to a wall is relative to."""
+        """The speed that sets the round-off of a velocity relative to a wall."""
         return norm(u) + norm(slip) if self.walls_move() else norm(u)
 
     def is_mixed(self, i):
-        """Whether a contact pushed in some stages of a composed step only: then energy went with it."""
+        """Whether a contact pushed only in some stages of a composed step, which does not conserve energy."""
         mixed = False
         for a in range(self.pace.active[i]):
             mixed = mixed or 0 < self.active.stages[i, a] < self.rule.stages.size
         return mixed
 
     def forget(self, i):
-        """Forget what was booked in a trial."""
+        """Reset the books of a trial."""
         active = self.active
         active.lost[i] = 0.0
         for a in range(active.name.shape[1]):
@@ -181,14 +181,14 @@ class BodyContacts(Constrained):
     # --- At openings
 
     def is_free(self, k, i):
-        """Whether a contact point of a lane is outside of the walls, through an opening."""
+        """Whether a contact point of a lane has left the walls through an opening."""
         if self.passages is None:
             return False
         number = self.pace.body[i]
         return number >= 0 and k < self.touching.points and self.passages.free[k, number] > 0
 
     def _passes(self, walls, contact, c, i):
-        """Whether the wall of a contact (point, wall) is open at its place: then the point is free from there on."""
+        """Let the point of a contact (point, wall) pass if the wall is open at its place; return whether it is."""
         if self.passages is None:
             return False
         k, wall = contact
@@ -199,7 +199,7 @@ class BodyContacts(Constrained):
         return True
 
     def is_back(self, k, i):
-        """Whether a free point is inside of all walls again, or at one that is not open there."""
+        """Whether a free point is inside of all walls again, or at a wall that is not open there."""
         walls, room = self.walls_now(i), self.rule.room
         back = self.passages.free[k, self.pace.body[i]] != BEHIND
         c, met = self.spot(self.lanes.r, k, i), self.touching.span(k)
@@ -210,16 +210,16 @@ class BodyContacts(Constrained):
                 back = back and gap <= 2.0 * ROOM * room and not self.passages.takes(walls, w, c, NEAR * room)
         return back
 
-    # --- At walls that end
+    # --- At walls with edges
 
     def passed(self, k, c, room, i):
-        """What a contact point goes through in a trial that it ends at c, by more than `room`."""
+        """Return the `WayThrough` of a contact point that ends a trial at c, farther than `room` behind a wall."""
         if not have_ends(self.walls) or k >= self.touching.points:
             return WayThrough(math.inf, -1.0, -math.inf)
         start, limits = self.touching.place(self.lanes.r, k, i), (_AT * self.rule.room, room, 0.0)
         if self.rule.period is None:
             return passed(self.walls_now(i), self.walls_then(i), start, c, limits)
-        # What lies on the way over a face is known in the cell of its start, or in that of its end.
+        # The walls on a way across a face of the cell are in the cell of its start, or in the cell of its end.
         found = WayThrough(math.inf, -1.0, -math.inf)
         for by in (start, c):
             ends = self.in_cell(k, start, by), self.in_cell(k, c, by)
@@ -229,21 +229,21 @@ class BodyContacts(Constrained):
         return found
 
     def come_back(self, i):
-        """Note which points that are behind walls that end come back through one of these in this step of a lane."""
+        """Mark the points behind walls with edges that come back through one of these walls in this step of a lane."""
         at, free, number = _AT * self.rule.room, self.passages.free, self.pace.body[i]
         for k in range(self.touching.points):
             if free[k, number] == BEHIND:
                 start, end = self.spot(self.lanes.r, k, i), self.spot(self.lanes.r1, k, i)
-                # A way back from there: what starts at a wall and leaves it inwards comes back through it.
+                # The reversed way, so that a point that starts at a wall and leaves it inwards comes back through it.
                 way = passed(self.walls_then(i), self.walls_now(i), end, start, (at, at, 2.0 * at))
                 free[k, number] = OUT if way.wall >= 0.0 else BEHIND
 
     # --- At their walls
 
     def near(self, i, name, frame, approaching):
-        """Find the contacts at their walls, or those that approach: how many there are.
+        """Find the contacts at their walls, or only approaching contacts; return their number.
 
-        Their names (point, wall), and a normal and two tangents of each.
+        `name` gets point and wall, and `frame` a normal and two tangents of each contact.
         """
         touching, walls, found = self.touching, self.walls_now(i), 0
         for k in range(touching.plain.size):
@@ -256,7 +256,7 @@ class BodyContacts(Constrained):
                 at_wall = found < MOST_CONTACTS and walls.distance(float(w), c) >= -NEAR * self.rule.room
                 if at_wall and not self._passes(walls, (k, w), c, i):
                     n, slip = walls.unit_normal(float(w), c), self.slip(walls, w, c, u)
-                    # A velocity towards the wall at the level of round-off does not count as an approach.
+                    # A velocity towards the wall of the size of round-off is no approach.
                     if not approaching or dot(n, slip) > 4.0 * EPSILON * self.fastest(u, slip):
                         name[found, 0], name[found, 1] = k, w
                         flat = Vec(1.0, 0.0, 0.0) if abs(n.x) < 0.6 else Vec(0.0, 1.0, 0.0)
@@ -270,7 +270,7 @@ class BodyContacts(Constrained):
 
 
 def count_at(walls, span, c):
-    """The number of walls of a span that a point may be at: of a field those of its cell, of a union one room's."""
+    """The number of walls of a span that a point may be at: in fields those of its cell, in unions of its room."""
     first, last = span
     fields, unions = walls.fields(), walls.joined()
     if (len(fields) == 0 and len(unions) == 0) or first > 0:
@@ -284,7 +284,7 @@ def count_at(walls, span, c):
 
 
 def wall_at(walls, span, j, c):
-    """One of these walls."""
+    """The wall with the number j among the walls that a point may be at."""
     if (len(walls.fields()) == 0 and len(walls.unions) == 0) or span[0] > 0:
         return span[0] + j
     return _wall_of_cells(walls, j, c)
@@ -292,7 +292,7 @@ def wall_at(walls, span, j, c):
 
 @outlined
 def _wall_of_cells(walls, j, c):
-    """The same of a scene with fields, or unions."""
+    """The wall with the number j among those at a point, in a scene with fields or unions."""
     for number, field in walls.fields():
         here = int(field.members.count_in_cell(c))
         if j < here:
@@ -310,7 +310,7 @@ def _wall_of_cells(walls, j, c):
 
 
 def direction(frame, a, d):
-    """Direction d of contact a: its normal, or one of two tangents."""
+    """The direction d of contact a: its normal, or one of two tangents."""
     return Vec(frame[a, d, 0], frame[a, d, 1], frame[a, d, 2])
 
 
@@ -320,21 +320,21 @@ def put_direction(frame, a, d, n):
 
 
 def put_frame(frame, a, n, t):
-    """Store the normal of a contact, and two tangents of which t is the first."""
+    """Store the normal n of a contact, the tangent t, and the other tangent."""
     put_direction(frame, a, 0, n)
     put_direction(frame, a, 1, t)
     put_direction(frame, a, 2, cross(n, t))
 
 
 def missing(system, j, wanted, x):
-    """wanted - (A x)_j"""
+    """Return wanted - (A x)_j."""
     for b in range(x.size):
         wanted -= system[j, b] * x[b]
     return wanted
 
 
 def rubbing(system, j, errors, forces, most):
-    """The tangential forces of the contact in row j, at most so large together, after a step of Gauss and Seidel."""
+    """Return the tangential forces of the contact in row j after a step of Gauss-Seidel, of size at most `most`."""
     stiff = max(system[j + 1, j + 1], system[j + 2, j + 2])
     one, other = forces[0] + errors[0] / stiff, forces[1] + errors[1] / stiff
     length = math.sqrt(one * one + other * other)
@@ -345,9 +345,9 @@ def rubbing(system, j, errors, forces, most):
 def sweep(touching, contacts, system, wanted, change, limits):
     """Find the forces of contacts by projected Gauss-Seidel.
 
-    No contact ends outside, none pulls, and one with friction stays or slides within its cone. What the forces change
-    by solves the system; it may be the forces themselves. The contacts are (their names, their forces, how many numbers
-    each has of these, and of the system); the limits are the most sweeps, and the part of the forces that ends them.
+    No contact ends outside, no contact pulls, and the friction of each is within its cone. The `change` of the forces
+    solves the system, and may be the array of the forces. `contacts` are names, forces, and the numbers of forces and
+    of rows of a contact. `limits` are the most sweeps, and the relative change of the forces that ends them.
     """
     name, force, stride, wide = contacts
     most, small = limits
@@ -371,7 +371,7 @@ def sweep(touching, contacts, system, wanted, change, limits):
 
 
 def solve_dense(a, f):
-    """f = a^-1 f of a system with a symmetric part that, but for factors of rows, is positive."""
+    """Compute f = a^-1 f for a system with a positive symmetric part, but for factors of rows."""
     rows = f.shape[0]
     for k in range(rows):
         for row in range(k + 1, rows):
@@ -386,7 +386,7 @@ def solve_dense(a, f):
 
 
 def _substitute(start, a, x, k, i):
-    """x[k] = A^-1 x[k] with the factored system of a lane."""
+    """Compute x[k] = A^-1 x[k] with the factored system of a lane."""
     m = x.shape[1]
     for row in range(m):
         for j in range(start[row], row):

@@ -1,4 +1,4 @@
-"""Counters of bodies: they get the way of each centre of mass in a step, and change no bit of it."""
+"""Counters of bodies. They read the way of each centre of mass in a step, and change no bit of it."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from .impact_time import COMMIT, STRIKE
 
 
 def centre(ties, r, i):
-    """The centre of mass of a lane, or with velocities its velocity."""
+    """The centre of mass of a lane, or its velocity if r has velocities."""
     total, mass = ZERO, 0.0
     for p in range(ties.mass.shape[0]):
         for q in range(ties.mass.shape[0]):
@@ -23,15 +23,15 @@ def centre(ties, r, i):
 
 
 def is_free(contacts, i):
-    """Whether nothing but gravity has acted on the centre of mass of a lane in its step: it falls in a parabola."""
+    """Whether only gravity has acted on the centre of mass of a lane in its step, so that its way is a parabola."""
     touching, ties = contacts.touching, contacts.ties
     return touching.guides == 0 and min(ties.is_free) and contacts.pace.active[i] == 0
 
 
 def count_steps(contacts, state):
-    """Count what the centres of all lanes cross in the steps that are about to be taken.
+    """Count the crossings of the centres of all lanes in the steps about to be taken.
 
-    A free flight is exact; where walls, guides or anchors act in the step, it is counted by its ends.
+    A free flight is counted exactly. A step in which walls, guides or anchors act is counted by its ends.
     """
     pace = contacts.pace
     for i in range(pace.body.size):
@@ -60,7 +60,7 @@ def _count_step(contacts, state, i):
 
 @outlined
 def come_into_cell(contacts, state, i):
-    """Bring a lane with a centre of mass that has left the cell back into it; its energy is that of the place there."""
+    """Wrap a lane with a centre of mass outside the cell into it; its energy becomes that of the new place."""
     ties, lanes, period, number = contacts.ties, contacts.lanes, contacts.rule.period, contacts.pace.body[i]
     there = centre(ties, lanes.r, i)
     if not has_left(period, there):

@@ -1,4 +1,4 @@
-"""Blows: the impulses of the walls at one instant, which turn a body round."""
+"""Blows: the impulses of the walls at one instant, which reverse the motion of a body."""
 
 import math
 from typing import Any
@@ -14,16 +14,17 @@ from ...lanes.watching.log import Struck
 from ...surfaces.periodic.period import into
 from .contacts import MOST_CONTACTS, direction, missing, sweep
 
-# Blows at one instant; sweeps over the contacts of one, and the change of their impulses that ends them.
+# The most blows at one instant; the most sweeps over the contacts of a blow, and the relative change of their impulses
+# that ends the sweeps.
 _BLOWS, SWEEPS = 200, (2000, 1e-17)
-# After so many short steps from impact to impact a wall that takes energy takes all of the approach.
+# After this number of short steps from impact to impact, a wall that takes energy takes all of the normal velocity.
 _CHATTER = 12
-# A step from impact to impact this short, as a part of a whole one, is a bounce on the way to rest.
+# A step from impact to impact below this part of a whole step is a bounce on the way to rest.
 SHORT = 1.0 / 16.0
 
 
 def chatters(touching, state, number):
-    """Whether bounces follow one another ever faster: then they end."""
+    """Whether bounces follow one another ever faster, and are to end."""
     laws = touching.laws
     loses = laws is not None and (laws.may_dissipate or laws.thermal is not None)
     return state.short[number] > _CHATTER and (loses or min(touching.restitution) < 1.0)
@@ -36,10 +37,10 @@ def is_absorbed(state, number):
 
 @outlined
 def restore(bodies, state, i):
-    """Restore the energy of a body after a blow, where only round-off is missing: else it is an error to be seen.
+    """Restore the energy of a body after a blow if only round-off is missing; any more is an error that must show.
 
-    Steps miss 1.5e-16 of it and blows 3e-16, at random: after 10^5 impacts 3e-12. All velocities are scaled, so that
-    links keep their lengths.
+    Steps lose or gain 1.5e-16 of the energy and blows 3e-16, at random: 3e-12 after 10^5 impacts. All velocities are
+    scaled, so that links keep their lengths.
     """
     ties, r, v, number = bodies.ties, bodies.lanes.r, bodies.lanes.v, bodies.pace.body[i]
     kinetic, fall, elastic = kinetic_of(ties, v, i), 0.0, _stretched(ties, r, i)
@@ -51,7 +52,7 @@ def restore(bodies, state, i):
             fall -= mass * bodies.rule.gravity[x] * r[3 * p + x, i]
     lost = state.energy[number] + state.work[number] - state.dissipated[number] - (kinetic + fall + elastic)
     if abs(lost) <= ENERGY_OF_IMPACT * (kinetic + abs(fall) + elastic) and kinetic > 0.0:
-        # To first order: a body that has come to rest has no velocity by which more could be restored.
+        # The correction is of first order only, as a body at rest has no velocity to scale.
         factor = 0.5 * lost / kinetic
         if factor * factor <= EPSILON:
             for row in range(v.shape[0]):
@@ -59,7 +60,7 @@ def restore(bodies, state, i):
 
 
 def _stretched(ties, r, i):
-    """The energy of springs."""
+    """The energy of springs of a lane."""
     total = 0.0
     for a in range(ties.links, ties.ends.shape[0]):
         y = column(r, 3 * ties.ends[a, 0], i) - column(r, 3 * ties.ends[a, 1], i)
@@ -81,10 +82,10 @@ def kinetic_of(ties, v, i):
 
 @outlined
 def strike(bodies, state, i):
-    """The blows at one instant, after which no contact at its wall approaches it; how many there are.
+    """Carry out the blows at one instant, until no contact at its wall approaches it; return their number.
 
-    For a wall without friction it is v+ = v- - (1 + e) (n.v)/(n K n) K n, where K is the inverse mass that links and
-    guides leave: K = W - W J (J W J)^-1 J W with a row of J for each. It is the contact step of the scheme for h -> 0.
+    At a wall without friction v+ = v- - (1 + e) (n.v)/(n K n) K n, where K is the inverse mass that links and guides
+    leave: K = W - W J (J W J)^-1 J W with a row of J for each. This is the contact step of the scheme for h -> 0.
     """
     name = scratch((MOST_CONTACTS, 2), np.int64)
     frame = scratch((MOST_CONTACTS, 3, 3), np.float64)
@@ -99,7 +100,7 @@ def strike(bodies, state, i):
 
 @outlined
 def _blow(bodies, state, name, frame, found, i):
-    """One blow at all these contacts; whether there is any."""
+    """Carry out one blow at all these contacts; return whether any wall pushes."""
     ties, touching, v, number = bodies.ties, bodies.touching, bodies.lanes.v, bodies.pace.body[i]
     bounces = 0.0 if chatters(touching, state, number) else 1.0
     m, wide = ties.links + touching.guides, touching.width(name, found)
@@ -109,10 +110,10 @@ def _blow(bodies, state, name, frame, found, i):
     rate, wanted, p = scratch(rows, np.float64), scratch(rows, np.float64), scratch(rows, np.float64)
     for a in range(rows):
         rate[a] = blow.rate(a, i)
-        # Without what links take of it: the velocity has a part across them, of the order of the scheme.
+        # The velocity strains links by the order of the scheme; the part of the rate that this causes is left out.
         for row in range(m):
             rate[a] -= blow.answer[a, row] * dot(column(blow.across, 0, row), blow.between(v, row, i))
-        # w+ = -e w- where a wall pushes
+        # w+ = -e w- where a wall pushes.
         bounced = bounces * touching.restitution[name[a // wide, 1]] if a % wide == 0 else 0.0
         wanted[a] = (1.0 + bounced) * rate[a]
     sweep(touching, (name, p, wide, wide), blow.schur, wanted, p, SWEEPS)
@@ -120,7 +121,7 @@ def _blow(bodies, state, name, frame, found, i):
         return False
     against = scratch(m, np.float64)
     if not elastic:
-        # Links of lengths that change give their energy away in the next short step, which takes a change back.
+        # Strains of links would lose their energy in the next short step, which reverses them.
         lost += blow.strain(scratch(m, np.float64), against, i)
         lost = blow.taken(lost, rate, p)
     before = scratch((3, found), np.float64)
@@ -137,7 +138,7 @@ def _blow(bodies, state, name, frame, found, i):
 
 
 def body_impact(bodies, name, frame, size, i):
-    """The `BodyImpact` of contacts, each with so many directions: `size` are (directions, contacts)."""
+    """Return the `BodyImpact` of contacts; `size` is the number of directions of each contact, and of contacts."""
     wide, found = size
     m, rows = bodies.ties.links + bodies.touching.guides, wide * found
     blow = BodyImpact(
@@ -150,7 +151,7 @@ def body_impact(bodies, name, frame, size, i):
 
 
 class BodyImpact(Record):
-    """One blow: its contacts, the links and guides that it strains, and how velocities answer impulses."""
+    """One blow: its contacts, the links and guides that it strains, and the responses of velocities to impulses."""
 
     bodies: Any
     name: Array
@@ -162,7 +163,7 @@ class BodyImpact(Record):
     schur: Array  # (rows, rows) n K n
 
     def direction(self, a):
-        """Direction of row a."""
+        """The direction of row a."""
         return direction(self.frame, a // self.wide, a % self.wide)
 
     def rate(self, a, i):
@@ -174,22 +175,22 @@ class BodyImpact(Record):
         return dot(self.direction(a), u)
 
     def unstrained_rate(self, a, strain, i):
-        """That velocity when links and guides have taken their strains, the rates J v."""
+        """The velocity of `rate` after links and guides have removed their strains, the rates J v."""
         rate = self.rate(a, i)
         for row in range(strain.size):
             rate -= self.answer[a, row] * strain[row]
         return rate
 
     def taken(self, lost, rate, p):
-        """The energy lost by strains, with what impulses take: p times the mean of the rates before and after."""
+        """The energy `lost` by strains plus that taken by impulses: p times the mean of the rates before and after."""
         for a in range(p.size):
             lost += 0.5 * p[a] * (rate[a] + missing(self.schur, a, rate[a], p))
         return lost
 
     def push(self, state, p, against, lost, i):
-        """Give impulses of walls and of links and guides, and return the work of walls and of led points.
+        """Apply impulses of walls, links and guides; return the work of walls and of led points.
 
-        What led points work is the change of the kinetic energy, of which `lost` is no part.
+        The work of led points is the change of the kinetic energy plus `lost`.
         """
         ties, v = self.bodies.ties, self.bodies.lanes.v
         is_led = max(ties.led) >= 0
@@ -199,7 +200,7 @@ class BodyImpact(Record):
         return (kinetic_of(ties, v, i) - before) + lost if is_led else work
 
     def work(self, state, p, i):
-        """Book the work of each wall that moves with these impulses, which push the body against the directions."""
+        """Book the work of each moving wall by these impulses, which are against the directions; return its sum."""
         total, bodies = 0.0, self.bodies
         if state.wall_work is not None:
             walls, number = bodies.walls_now(i), bodies.pace.body[i]
@@ -212,14 +213,14 @@ class BodyImpact(Record):
         return total
 
     def tell(self, state, a, before, impulse, i):
-        """Count the impact at contact a, which had a velocity before, and tell the watchers of it."""
+        """Count the impact at contact a, with the velocity `before`, and show it to the watchers."""
         state.impacts[self.bodies.pace.body[i]] += 1
         # Watchers see no cavity that a point carries.
         if self.name[a, 1] < self.bodies.touching.walls:
             state.watchers.hit(state.image, self.struck(a, before, impulse, i))
 
     def struck(self, a, before, impulse, i):
-        """The `Struck` of contact a, which had a velocity before."""
+        """Return the `Struck` of contact a, with the velocity `before`."""
         bodies, (k, wall) = self.bodies, (self.name[a, 0], self.name[a, 1])
         c, u = bodies.spot(bodies.lanes.r, k, i), bodies.touching.place(bodies.lanes.v, k, i)
         images = into(bodies.rule.period, bodies.touching.place(bodies.lanes.r, k, i)).images
@@ -239,14 +240,14 @@ class BodyImpact(Record):
         return self.bodies.ties.ends.shape[0] + self.name[a // self.wide, 0]
 
     def between(self, r, row, i):
-        """The vector from one end of a link to the other, or the place of a guide's point."""
+        """The vector between the ends of a link, or the place of a guided point."""
         ties, touching = self.bodies.ties, self.bodies.touching
         if row >= ties.links:
             return touching.place(r, touching.points + row - ties.links, i)
         return column(r, 3 * ties.ends[row, 0], i) - column(r, 3 * ties.ends[row, 1], i)
 
     def hold(self, i):
-        """The vector of every link and guide, and the Cholesky factor of J W J."""
+        """Compute the vector of every link and guide, and the Cholesky factor of J W J."""
         bodies, system = self.bodies, self.system
         ties, touching = bodies.ties, bodies.touching
         for a in range(system.shape[0]):
@@ -261,7 +262,7 @@ class BodyImpact(Record):
                 system[a, b] = s / system[b, b] if b < a else math.sqrt(s)
 
     def respond(self):
-        """The Delassus matrix: the answer of the velocities of contacts to impulses at them."""
+        """Compute the Delassus matrix: the responses of the velocities of contacts to impulses at them."""
         couplings, system, answer, schur = self.bodies.ties.couplings, self.system, self.answer, self.schur
         rows, m = answer.shape
         for a in range(rows):
@@ -283,9 +284,9 @@ class BodyImpact(Record):
                 answer[a, row] /= system[row, row]
 
     def strain(self, rate, against, i):
-        """The rates J v of links and guides, the impulses against them -(J W J)^-1 J v, and the energy that these take.
+        """Compute the rates J v of links and guides and the impulses -(J W J)^-1 J v; return the energy they take.
 
-        Velocities keep rates of the order of the scheme, since a step turns them round.
+        Velocities keep rates of the order of the scheme, as a step reverses them.
         """
         m, system = rate.size, self.system
         for row in range(m):
@@ -303,7 +304,7 @@ class BodyImpact(Record):
         return lost
 
     def give(self, p, against, i):
-        """v -= W (sum p (b d - sum x J) - sum against J), where `against` is used up"""
+        """Compute v -= W (sum p (b d - sum x J) - sum against J); `against` is overwritten."""
         ties, touching, v = self.bodies.ties, self.bodies.touching, self.bodies.lanes.v
         m, points = self.answer.shape[1], v.shape[0] // 3
         push = scratch((3, points), np.float64)

@@ -1,4 +1,4 @@
-"""The instant of an impact: where the step of a body is cut, by secants in a bracket."""
+"""The time of impact at which the step of a body is cut, found by secants in a bracket."""
 
 import math
 
@@ -8,19 +8,19 @@ from .contacts import NEAR, count_at, wall_at
 
 # The action of a lane after a trial.
 AGAIN, COMMIT, STRIKE, STRIKE_NOW, FAILED = 0, 1, 2, 3, 4
-# As fractions of a whole step: a bracket of the time of impact this narrow is a point, and a body that comes back to a
-# wall within a step this short does not leave the wall.
+# As parts of a whole step: a bracket of the time of impact narrower than `_NARROW` is a point, and a body that comes
+# back to a wall within `_SHORTEST` does not leave the wall.
 _NARROW, _SHORTEST = 1e-13, 1e-4
-# A guess by the velocity that leaves less than this part of the gap is a good one.
+# A guess by the velocity is good if less than this part of the gap remains.
 _CLOSER = 0.25
-# Trials after which the bracket is halved each time.
+# The trials after which the bracket is halved each time.
 _QUICK = 40
-# A step with ties that have no solution is halved this often.
+# The part of a whole step down to which a step is halved while its ties have no solution.
 _HALVED = 2.0**-20
 
 
 def halve(bodies, i):
-    """A step with ties that have no solution is halved, but not for ever."""
+    """Halve a step with ties that have no solution; return AGAIN, or FAILED if it is too short."""
     pace = bodies.pace
     pace.trial[i] = 0.5 * pace.step[i]
     pace.low[i], pace.high[i], pace.wall[i] = 0.0, math.inf, -1
@@ -29,13 +29,16 @@ def halve(bodies, i):
 
 @outlined
 def look(bodies, i, larger):
-    """The time at which a step that ends outside is cut; contacts that last may end outside by `larger`."""
+    """Find the time at which a step that ends outside is cut; return the action of the lane.
+
+    Lasting contacts may end outside by `larger`.
+    """
     touching, walls, rule, lanes, pace = bodies.touching, bodies.walls_then(i), bodies.rule, bodies.lanes, bodies.pace
     tau = pace.step[i]
     pace.stuck[i] += 1
     if not pace.solved[i]:
         return halve(bodies, i)
-    # The forces of contacts that last leave a part of it.
+    # The forces of lasting contacts leave larger gaps.
     room = rule.room if pace.active[i] == 0 else larger
     worst, first, point, wall = -math.inf, tau, -1, -1
     for k in range(touching.plain.size):
@@ -59,11 +62,11 @@ def look(bodies, i, larger):
     again, low = pace.wall[i] >= 0, pace.low[i]
     pace.point[i], pace.wall[i] = point, wall
     if tau - low <= _NARROW * rule.dt:
-        # The bracket ends here: the trial at its lower end, farther inside than round-off, is then the impact.
+        # The bracket is a point: the trial at its lower end, farther inside than round-off, is then the impact.
         pace.high[i], pace.trial[i] = tau, low
         return STRIKE_NOW if low == 0.0 else AGAIN
     if low == 0.0 and tau <= _SHORTEST * rule.dt:
-        # It is at the wall, and does not leave it.
+        # The contact is at the wall, and does not leave it.
         start = bodies.walls_now(i).distance(float(wall), _start(bodies, point, i))
         if start >= -NEAR * rule.room:
             return STRIKE_NOW
@@ -71,8 +74,8 @@ def look(bodies, i, larger):
     if pace.high[i] < math.inf and again:
         pace.inside[i] *= _weight(worst, pace.outside[i])
     pace.high[i], pace.outside[i] = tau, worst
-    # The first guess follows from the velocity at the end. It is useless if that has a component along the ties. If the
-    # last guess was good, a step back twice as long ends just inside.
+    # The first guess follows from the velocity at the end. It is useless if this velocity has a component along the
+    # ties. If the last guess was good, a step back twice as long ends just inside.
     beyond = 2.0 * first - tau
     if low < first < tau and not again:
         pace.trial[i] = first
@@ -84,7 +87,7 @@ def look(bodies, i, larger):
 
 
 def _rests(bodies, k, wall, i):
-    """Whether a contact lasts, so that its gap says nothing of the time at which another one is met."""
+    """Whether a contact lasts, so that its gap says nothing about the time of another impact."""
     pace, name, lasts = bodies.pace, bodies.active.name, False
     if not bodies.touching.dissipates(wall) or (k == pace.point[i] and wall == pace.wall[i]):
         return False
@@ -94,7 +97,7 @@ def _rests(bodies, k, wall, i):
 
 
 def _stays(bodies, k, wall, gap, i):
-    """Whether a contact of a lasting step is as far outside as it was, since short steps do not bring it back."""
+    """Whether a contact is as far outside as at the start of the step, as short steps do not bring it back."""
     if bodies.pace.active[i] == 0 or not bodies.touching.dissipates(wall):
         return False
     start = bodies.walls_now(i).distance(float(wall), _start(bodies, k, i))
@@ -107,7 +110,7 @@ def _start(bodies, k, i):
 
 
 def _inside(rule, pace, i, gap):
-    """The trial ends inside: it is the step, the step to the impact, or a lower end of the bracket."""
+    """Return the action after a trial that ends inside: a step, a step to the impact, or a lower end of the bracket."""
     wall, tau = pace.wall[i], pace.step[i]
     if wall < 0:
         return COMMIT
@@ -121,13 +124,13 @@ def _inside(rule, pace, i, gap):
 
 
 def _weight(gap, before):
-    """The weight of an end of the bracket that stays when the other moves again (Anderson and Bjorck)."""
+    """The weight of an end of the bracket that is kept when the other one moves again (Anderson and Bjorck)."""
     weight = 1.0 - gap / before
     return weight if weight > 0.0 else 0.5
 
 
 def _between(rule, pace, i):
-    """The next time to try in the bracket: by the secant, to where the worst contact is half of round-off inside."""
+    """The next time to try in the bracket: by the secant, half of round-off inside for the worst contact."""
     low, high = pace.low[i], pace.high[i]
     inside, outside = pace.inside[i] + 0.5 * rule.room, pace.outside[i] + 0.5 * rule.room
     time = low - (high - low) * inside / (outside - inside)

@@ -1,26 +1,26 @@
-"""One stage of a step: the multipliers of all that holds a body, by Newton's method, in all lanes at once.
+"""One stage of a step: the multipliers of ties, guides and contacts by Newton's method, in all lanes together.
 
-The system of the ties is factored once for several corrections, which are cheap; each shrinks errors by some
-(h omega)^2. Each lane stops by itself, so that its bits do not depend on its neighbours.
+The system of the ties is factored once for several corrections, which are cheap; each one shrinks errors by some
+(h omega)^2. Each lane stops independently, so that its bits do not depend on its neighbours.
 """
 
 from ...kernel.jit import select
 from . import sticking
 
-# Most corrections, and after how many the system is factored again.
+# The most corrections, and the corrections after which the system is factored again.
 _MOST, _AGAIN = 40, 5
-# After this correction a lane that needs more goes on in the next pass: a step after a blow takes five corrections, and
-# 31 lanes would wait for each. Later corrections are one of 80 in free steps.
+# After this correction a lane that needs more goes on in the next pass: a step after a blow takes five corrections, for
+# which 31 lanes would wait. In free steps, one correction of 80 is a later one.
 _SOON = 1
-# In a stage this short, as a part of dt, links turn by less than round-off: what a correction would correct is the
-# round-off of places, over h a velocity.
+# In a stage shorter than this part of dt, links turn by less than round-off: a correction would turn the round-off of
+# places, divided by h, into a velocity.
 BRIEF = 1e-8
 
 
 def solve(contacts):
-    """The end r1, v1 of a stage from (ra, va) with the steps pace.h; pace.done is False where none is found.
+    """Compute the end r1, v1 of a stage of length pace.h from (ra, va); pace.done is False if none is found.
 
-    Points that are led must be in r1 already. Lanes that are done at the start are left out.
+    Led points must be in r1 already. Lanes that are done at the start are left out.
     """
     ties, rule, lanes, pace = contacts.ties, contacts.rule, contacts.lanes, contacts.pace
     count, more = pace.h.size, contacts.touching.guides
@@ -38,11 +38,11 @@ def solve(contacts):
         if _is_held(contacts, i):
             _turn(contacts, i, lanes.ra)
     if ties.ends.shape[0] > 1:
-        # Where the multipliers are guessed well, D is the only error, and with one tie none: it follows once more.
+        # With a good guess of the multipliers, D is the only error (with one tie it has no error): D follows once more.
         _push(contacts, 0)
         contacts.follow()
     for turn in range(_MOST + 1):
-        # D follows the multipliers before they are corrected: together, the second makes up again for the first.
+        # D follows the multipliers before they are corrected: done together, the correction would undo the change.
         _push(contacts, more)
         contacts.follow()
         if more > 0:
@@ -81,18 +81,18 @@ def solve(contacts):
 
 
 def _turn(contacts, i, r1):
-    """Directions of guides and contacts."""
+    """Set the directions of guides and contacts."""
     contacts.turn_guides(i, r1)
     contacts.turn(i, r1)
 
 
 def _is_held(contacts, i):
-    """Whether more than ties is to be solved in a lane."""
+    """Whether guides or contacts are to be solved in a lane."""
     return (not contacts.pace.done[i]) and (contacts.touching.guides > 0 or contacts.pace.active[i] > 0)
 
 
 def _push(contacts, more):
-    """r1 = p - (h^2/2) W (sum lambda D + sum p b d)"""
+    """Compute r1 = p - (h^2/2) W (sum lambda D + sum p b d)."""
     contacts.accelerate()
     if more > 0:
         for i in range(contacts.pace.h.size):
@@ -110,7 +110,7 @@ def _all(done):
 
 
 def _factor(start, a):
-    """A = L U in place, with 1/U on the diagonal; the entries before `start` of a row, and of its column, are 0."""
+    """Factor A = L U in place, with 1/U on the diagonal; entries before `start` of a row, and of its column, are 0."""
     count = a.shape[2]
     for row in range(a.shape[0]):
         first = start[row]
@@ -130,7 +130,7 @@ def _factor(start, a):
 
 
 def _substitute(start, a, f):
-    """f = A^-1 f, where A is factored."""
+    """Compute f = A^-1 f, where A is factored."""
     count = f.shape[1]
     for row in range(f.shape[0]):
         for k in range(start[row], row):

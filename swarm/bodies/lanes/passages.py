@@ -1,4 +1,4 @@
-"""Contact points that pass openings: those that have are outside of the walls, meet none of them, and may come back."""
+"""Contact points that pass openings: outside of the walls they meet no wall, and they may come back."""
 
 from typing import Any
 
@@ -6,16 +6,16 @@ from ...contact.absence import lets_through
 from ...kernel.jit import outlined
 from ...kernel.record import Record
 
-# Where a contact point is: it has passed an opening, and that of a wall that ends and is not back through one.
+# The states of a contact point that has passed an opening. BEHIND: the wall has edges, and the point has not come back.
 OUT, BEHIND = 1, 2
 
 
 class Passages(Record):
-    """The openings of the walls, and the contact points outside of these."""
+    """The openings of the walls, and the contact points outside of the walls."""
 
     openings: Any  # each `Opened` of the walls
-    free: Any  # (K, n) int8, whether a contact point has passed one: 0, or OUT or BEHIND
-    escape_time: Any  # (n,) when all those of a body had [s], NaN of bodies that are inside
+    free: Any  # (K, n) int8, whether a contact point has passed an opening: 0, OUT or BEHIND
+    escape_time: Any  # (n,) when all contact points of a body had passed [s], NaN of bodies inside
 
     def takes(self, walls, wall, c, near):
         """Whether a wall is open at a place on it."""
@@ -24,7 +24,7 @@ class Passages(Record):
 
 @outlined
 def look_back(contacts, i):
-    """At the end of a step: points that have come back meet the walls, and a body with all points out ends."""
+    """At the end of a step, let points that are back meet walls again, and end bodies with all points outside."""
     touching, pace, passages = contacts.touching, contacts.pace, contacts.passages
     number, out = pace.body[i], 0
     for k in range(touching.points):

@@ -1,10 +1,10 @@
-"""Walls that are springs, and multipliers by Uzawa's loop: what `Penalty` and `AugmentedLagrangian` are for bodies.
+"""Soft walls, and multipliers by Uzawa's loop: `Penalty` and `AugmentedLagrangian` for bodies.
 
 Each contact pushes with F = V[g0, g1] + lambda Phi[g0, g1] along g[q0, q1] D_q, the composite discrete gradient of its
-gap, as of particles (contact/impulse.py): its work is the change of V + lambda Phi, exactly. With p for its force
-Newton's method solves p = F(g1) with ties and guides at once. The loop (8) then takes V to zero,
-    lambda <- lambda + alpha (Phi0 + Phi1)/2,
-of walls and of links, which are relaxed for it (constraints.py).
+gap, as for particles (contact/impulse.py): its work is exactly the change of V + lambda Phi. Newton's method solves
+p = F(g1) for the force p together with ties and guides. The loop (8) then reduces V of walls, and of links, which are
+relaxed for it (constraints.py), to zero by
+    lambda <- lambda + alpha (Phi0 + Phi1)/2.
 Source: García Orden & Ortega 2007, eqs. (5), (7), (8).
 """
 
@@ -21,13 +21,13 @@ from .contacts import MOST_CONTACTS, NEAR, ROOM, BodyContacts, direction, put_di
 
 
 class Soft(NamedTuple):
-    """The law of walls that are springs, and the parameters of Uzawa's loop (8) for their multipliers."""
+    """The law of soft walls, and the parameters of Uzawa's loop (8) for their multipliers."""
 
     law: Any  # of contact/regularisation.py
-    tolerance: float  # of the stored energy V [J], which ends the loop
-    sweeps: int  # most of them; 1: no multipliers
+    tolerance: float  # the stored energy V that ends the loop [J]
+    sweeps: int  # the most sweeps; 1: no multipliers
     is_cut: bool  # whether steps are cut at an impact, as the loop needs it
-    deepest: float  # gap [m] that stores the tolerance
+    deepest: float  # the gap that stores the tolerance [m]
 
 
 def _normal_of(surface, r0, r1):
@@ -49,19 +49,19 @@ def _gap(walls, wall, r):
     return walls.of(wall, 0.0, _gap_of, r)
 
 
-# From this correction on the equations may be worse by the factor, in units of round-off.
+# From correction `_PATIENT` on the equations may have errors of `_LARGER`, in units of round-off.
 _PATIENT, _LARGER = 30, 1e2
-# An error of the square of a length is round-off up to this many units.
+# The round-off of the square of a length, in units of `noise`.
 _ROUND_OFF = 8.0
-# By how much the directions of ties may still change, in units of round-off of a place.
+# The last change of the directions of ties, in units of round-off of a place.
 _SETTLED = 8.0
 
 
 class SoftContacts(BodyContacts):
-    """Contacts with walls that are springs."""
+    """Contacts with soft walls."""
 
     def _start(self: Any, wall, y):
-        """The gap at the start of a step; in the loop what its tolerance leaves is 0: only State I has a limit."""
+        """The gap at the start of a step; in the loop 0 if it is within the tolerance, as only State I has a limit."""
         gap, rule = _gap(self.walls, wall, y), self.rule
         return 0.0 if rule.loop and abs(gap) <= 2.0 * max(rule.walls.deepest, ROOM * rule.room) else gap
 
@@ -79,7 +79,7 @@ class SoftContacts(BodyContacts):
 
     @outlined
     def begin(self: Any, i):
-        # Those at their walls where steps are cut; else those that are outside, at the start or in the trial before.
+        # The contacts at walls if steps are cut; else the contacts outside, at the start or in the trial before.
         touching, rule, lanes, pace, active = self.touching, self.rule, self.lanes, self.pace, self.active
         name, found, again = active.name[i], 0, not pace.fresh[i]
         fresh, press = scratch((rule.most, 2), np.int64), scratch(rule.most, np.float64)
@@ -112,7 +112,7 @@ class SoftContacts(BodyContacts):
         for a in range(pace.active[i]):
             k, wall = active.name[i, a, 0], float(active.name[i, a, 1])
             n = _normal(self.walls, wall, touching.place(self.lanes.ra, k, i), touching.place(r1, k, i))
-            # What its force moves the point by, as a change of D turns it.
+            # The change of the place of the point as a change of D turns the force.
             moved = half * self.ties.couplings[ties + k, ties + k] * active.press[i, 3 * a]
             pace.lag[i] += square(moved * (n - direction(frame, a, 0)))
             put_direction(frame, a, 0, n)
@@ -131,7 +131,7 @@ class SoftContacts(BodyContacts):
             g0 = self._start(wall, touching.place(lanes.ra, k, i))
             g1 = _gap(self.walls, wall, touching.place(lanes.r1, k, i))
             # In State I the force jumps at g1 = 0 from 0 to lambda, which may be more than a step needs while links are
-            # not met: then it is what g1 = 0 asks for, as of a rigid wall.
+            # not met. The force is then the one that gives g1 = 0, as at a rigid wall.
             force = active.press[i, 3 * a] + g1 / system[a, a]
             if g0 == 0.0 and 0.0 <= force <= multiplier:
                 error = max(error, abs(g1) / rule.room)
@@ -142,7 +142,7 @@ class SoftContacts(BodyContacts):
                 end = max(g1, 0.0) if force > 0.0 else min(g1, 0.0)
             force, stiffness = law.force(multiplier, g0, end)
             missing = force + stiffness * (g1 - end) - active.press[i, 3 * a]
-            # p + dp = F(g1 + dg), where dg is by the corrections of ties and guides and by -S dp
+            # p + dp = F(g1 + dg), where dg follows from the corrections of ties and guides, and from -S dp.
             give = system[a, a] / (1.0 + stiffness * system[a, a])
             error = max(error, give * abs(missing) / rule.room)
             change[a] = missing + stiffness * change[a]
@@ -156,10 +156,10 @@ class SoftContacts(BodyContacts):
                 lanes.f[row, i] -= across[a, row] * change[a]
         before = pace.unsettled[i] if number > 0 else math.inf
         pace.unsettled[i] = error
-        # What D lags behind does work on springs: to stop without asking loses 1e-9 of the energy of a chain that
-        # whips, and as much of that of a pin that slides in its cavity.
+        # The lag of D does work on springs: without this condition, a whipping chain loses 1e-9 of its energy, and
+        # a pin that slides in its cavity as much.
         settled = error <= 1.0 and pace.lag[i] <= _SETTLED * _SETTLED * rule.room * rule.room
-        # Where V is stiff its round-off is more than that of a place.
+        # The round-off of a stiff V is more than that of a place.
         pace.last[i] = settled or (number >= _PATIENT and error <= _LARGER and error >= 0.5 * before)
 
     def gap_gradient(self: Any, wall, y, i):
@@ -168,10 +168,10 @@ class SoftContacts(BodyContacts):
     # --- Uzawa's loop
 
     def begin_loop(self: Any):
-        # The multipliers of links are from the steps before, those of walls from 0: above its limit a loop has no step.
+        # Multipliers of links begin as in the steps before, multipliers of walls at 0: above the limit no step exists.
         ties, lanes, pace, active = self.ties, self.lanes, self.pace, self.active
         for i in range(pace.h.size):
-            # A sweep shrinks errors by alpha h^2/m: what the cut of a step leaves would take thousands.
+            # A sweep shrinks errors by alpha h^2/m: the short steps that a cut leaves would take thousands of sweeps.
             pace.ease[i] = (pace.h[i] / self.rule.dt) * (pace.h[i] / self.rule.dt)
         for a in range(ties.springs - ties.relaxed, ties.springs):
             for i in range(pace.h.size):
@@ -195,21 +195,21 @@ class SoftContacts(BodyContacts):
             if pace.loops[i]:
                 self._update(i)
         for i in range(pace.h.size):
-            # D stays as it is where others go on. (To ask for `done` in `launch` takes a third longer for a free step.)
+            # D is kept in lanes that are done. (A test of `done` in `launch` takes a third longer in a free step.)
             pace.waits[i] = 1 if live > 0 and pace.done[i] else 0
         return live
 
     def _lengths(self: Any, a, i):
-        """|y|^2 of a tie at both ends of the stage, less l^2"""
+        """|y|^2 - l^2 of a tie at both ends of the stage."""
         ties, lanes = self.ties, self.lanes
         y1 = column(lanes.r1, 3 * ties.ends[a, 0], i) - column(lanes.r1, 3 * ties.ends[a, 1], i)
         return square(column(lanes.y0, 3 * a, i)) - ties.rest[a], square(y1) - ties.rest[a]
 
     @outlined
     def _stored(self: Any, i):
-        """V at the end of the step, of walls and links; a link stores alpha c^2/2 with c = (|y|^2 - l^2)/(2 l).
+        """V of walls and links at the end of the step; a link stores alpha c^2/2 with c = (|y|^2 - l^2)/(2 l).
 
-        What is round-off of a length stores nothing.
+        Round-off of a length stores nothing.
         """
         ties, rule, law, active = self.ties, self.rule, self.rule.walls.law, self.active
         stored = 0.0
@@ -226,7 +226,7 @@ class SoftContacts(BodyContacts):
 
     @outlined
     def _update(self: Any, i):
-        """lambda <- lambda + alpha (Phi0 + Phi1)/2 of walls and links"""
+        """Update the multipliers of walls and links: lambda <- lambda + alpha (Phi0 + Phi1)/2."""
         ties, touching, lanes, law, active = self.ties, self.touching, self.lanes, self.rule.walls.law, self.active
         for a in range(ties.springs - ties.relaxed, ties.springs):
             before, after = self._lengths(a, i)
@@ -244,7 +244,7 @@ class SoftContacts(BodyContacts):
     def judge(self: Any, i):
         touching, rule, pace = self.touching, self.rule, self.pace
         if rule.walls.is_cut:
-            # The loop leaves a contact outside by what its tolerance stores.
+            # The loop leaves a contact outside by the gap that stores the tolerance.
             return impact_time.look(self, i, 2.0 * max(rule.walls.deepest, ROOM * rule.room))
         pace.stuck[i] += 1
         if not pace.solved[i]:
@@ -259,7 +259,7 @@ class SoftContacts(BodyContacts):
 
     @outlined
     def end(self: Any, state, i):
-        # Where steps are cut a contact lasts as long as it pushes, else as long as its point is outside.
+        # If steps are cut, a contact lasts as long as it pushes; else as long as its point is outside.
         lanes, pace, active = self.lanes, self.pace, self.active
         number, lasts = pace.body[i], False
         for a in range(pace.active[i]):
@@ -278,7 +278,7 @@ class SoftContacts(BodyContacts):
 
     @outlined
     def strike(self: Any, state, i):
-        # The next step is that of the contact, from State I.
+        # The next step is the step of the contact, from State I.
         name = scratch((MOST_CONTACTS, 2), np.int64)
         frame = scratch((MOST_CONTACTS, 3, 3), np.float64)
         for a in range(self.near(i, name, frame, True)):

@@ -1,8 +1,8 @@
-"""Contacts with rigid walls that last: one constraint more for each.
+"""Lasting contacts with rigid walls: each adds a constraint.
 
-A contact that lasts is g(q1) = g(q0) for as long as its multiplier pushes: no contact moves through its wall, so their
-forces do no work but that of friction. Newton's method solves ties and guides together; what is left of it for the
-contacts (Schur's complement) is solved by Gauss-Seidel, until gaps and signs are right.
+A lasting contact has g(q1) = g(q0) for as long as its multiplier pushes: no contact moves through its wall, and its
+force does no work but that of friction. Newton's method solves ties and guides together. The Schur complement of the
+contacts is solved by Gauss-Seidel, until gaps and signs are right.
 """
 
 import math
@@ -16,27 +16,27 @@ from ...kernel.vector import dot, norm
 from . import impact, impact_time, sent_off, sticking
 from .contacts import MOST_CONTACTS, NEAR, ROOM, BodyContacts, direction, put_direction, put_frame, sweep
 
-# From this correction of a stage on the equations may be worse by the factor, in units of round-off, where more than so
-# many contacts hold a body: their forces are not determined, and converge slowly.
+# From correction `_PATIENT` of a stage on, the equations may have errors of `_LARGER`, in units of round-off, if more
+# than `_DETERMINED` contacts hold a body: their forces are not determined, and converge slowly.
 _PATIENT, _LARGER, _DETERMINED = 20, 1e3, 3
-# Sweeps over the contacts in one correction, and the change of their forces that ends them.
+# The most sweeps over the contacts in one correction, and the relative change of their forces that ends the sweeps.
 _SWEEPS = 60, 1e-16
-# The most that an error of friction moves a contact [m/s].
+# The largest velocity of a contact by an error of friction [m/s].
 _CREEP = 1e-7
-# After so many blows without a step the contacts last.
+# After this number of blows without a step the contacts last.
 _LASTS = 20
 
 
 class HardContacts(BodyContacts):
-    """Contacts with rigid walls, which strike, and last as long as they push."""
+    """Contacts with rigid walls: they begin with a blow, and last as long as they push."""
 
     @outlined
     def begin(self: Any, i):
-        # In a step they press as in the step before where they are the same.
+        # Contacts that are the same as in the step before begin with its forces.
         pace, active, most = self.pace, self.active, self.rule.most
         if not (pace.fresh[i] or not pace.solved[i]):
-            # All trials of a step begin alike. Friction is solved to `_CREEP`, not to round-off: from the forces of the
-            # trial before, one that ended inside ends outside when it is made again, and no time would be the impact's.
+            # All trials of a step begin alike. Friction is solved to `_CREEP`, not to round-off: a repeated trial that
+            # began with other forces could end on the other side of the wall, and no time of impact would be found.
             for a in range(pace.active[i]):
                 for d in range(3):
                     active.press[i, 3 * a + d] = active.press[i, 3 * (most + a) + d]
@@ -53,7 +53,7 @@ class HardContacts(BodyContacts):
             same = same and fresh[a, 0] == name[a, 0] and fresh[a, 1] == name[a, 1]
         pace.active[i] = found
         for a in range(3 * found):
-            # Steadily growing forces are guessed exactly.
+            # This guess is exact for forces that grow linearly.
             p, last = active.press[i, a], active.before[i, a]
             active.press[i, a] = 2.0 * p - last if same and last == last else p
             active.before[i, a] = p if same else math.nan
@@ -100,7 +100,7 @@ class HardContacts(BodyContacts):
                 way, away = way - carried, away - moved
             for d in range(wide):
                 gap[wide * a + d] = dot(direction(active.frame[i], a, d), away if d == 0 else way)
-            # Gaps of round-off stay what they are; in a composed stage a contact can also be away from its wall.
+            # Gaps of round-off are kept; in a composed stage a contact can also be away from its wall.
             start = self.walls_between(i).distance(float(wall), y0)
             outside = start > 0.0 and not eased
             gap[wide * a] += start if outside or start < -NEAR * rule.room else 0.0
@@ -109,13 +109,13 @@ class HardContacts(BodyContacts):
         before = pace.unsettled[i] if number > 0 else 1.0
         pace.unsettled[i] = error
         late = number >= _PATIENT and found > _DETERMINED
-        # One correction more than errors of round-off ask for, since directions lag behind forces: to stop where the
-        # next would be within round-off loses 4e-10 J of 40 J in a step of examples/slider_crank.py.
+        # One correction more than errors of round-off need, as directions lag behind forces: to stop one correction
+        # earlier loses 4e-10 J of 40 J in a step of examples/slider_crank.py.
         last = error <= 1.0 or (late and error <= _LARGER and error >= 0.5 * before)
         self.eliminate(wide, (along, across, schur, gap), i)
         sweep(touching, (active.name[i], active.press[i], 3, wide), schur, gap, change, _SWEEPS)
-        # How far friction moves a contact by its change: which way a point creeps is less exact, since what it loses is
-        # booked whatever it is.
+        # The velocity of a contact by the change of friction. The creep of a point need not be exact, as the energy it
+        # loses is booked in any case.
         creep = 0.0
         for a in range(found):
             for d in range(1, wide):
@@ -134,7 +134,7 @@ class HardContacts(BodyContacts):
 
     @outlined
     def end(self: Any, state, i):
-        # Contacts last as long as one of them pushes, and where no force has acted.
+        # Contacts last as long as one of them pushes, and after a step without forces.
         pace, active = self.pace, self.active
         number, pushes = pace.body[i], pace.brief[i]
         for a in range(pace.active[i]):
@@ -159,7 +159,7 @@ class HardContacts(BodyContacts):
         blows = impact.strike(self, state, i)
         if self.touching.laws is not None and at_once and blows == 0:
             blows = sent_off.leave_rest(self, state, i)
-        # The energy of a strain takes as many products as the square of its edges.
+        # The energy of a strain takes a number of products that grows with the square of its edges.
         if blows > 0 and max(ties.led) < 0 and ties.compliance.shape[0] == 0:
             impact.restore(self, state, i)
         stays = impact.chatters(self.touching, state, number) or pace.stuck[i] > _LASTS

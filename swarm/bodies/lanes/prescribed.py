@@ -1,4 +1,4 @@
-"""Points that are led along a path s(t), and the work that leading them takes."""
+"""Points that are led along a path s(t), and the work of leading them."""
 
 import math
 
@@ -6,11 +6,11 @@ from ...kernel.vector import column, put
 
 
 def lead(bodies, state, elapsed):
-    """Put led points where their paths are at the end of a stage, with the velocity there.
+    """Move led points to their places at the end of a stage, with the velocities of their paths.
 
-    `elapsed` is the part of the step at the end of the stage. A point goes on from where it is by the difference of its
-    path, which is smooth in the length of the stage: a place of its own for each time has steps of the round-off of the
-    time, 6e-15 m after a second at 26 m/s, in which no time of impact is found.
+    `elapsed` is the part of the step at the end of the stage. A point moves by the difference of its path, which is
+    smooth in the length of the stage. A place computed from the time alone has steps of the round-off of the time,
+    6e-15 m after a second at 26 m/s, in which no time of impact is found.
     """
     led, lanes, pace = bodies.ties.led, bodies.lanes, bodies.pace
     for q in range(led.size):
@@ -32,7 +32,7 @@ def lead(bodies, state, elapsed):
 
 
 def book(bodies, last):
-    """Add the work of led points in a stage on ties and contacts: the sum of (sum lambda D + sum p b d).(s1 - s0)."""
+    """Add the work of led points on ties and contacts in a stage: the sum of (sum lambda D + sum p b d).(s1 - s0)."""
     ties, lanes, pace, active = bodies.ties, bodies.lanes, bodies.pace, bodies.active
     for q in range(ties.led.size):
         if ties.led[q] >= 0:

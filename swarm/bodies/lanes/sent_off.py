@@ -1,12 +1,12 @@
 """Impacts of bodies on walls that send them off: with a temperature, or by `laws` of a surface.
 
-A contact point answers an impulse P with the velocity K P, where K is the (3, 3) inverse mass that the body has there.
-With the normal n, m = 1/(n K n), and A = m (K_tt - m K_tn K_nt) across it,
-    w_n = u_n,   w_t = A^(-1/2) (u_t - m K_tn u_n)
-of its velocity u relative to the wall is that of a particle of mass m with the energy m w^2/2 = u K^-1 u/2: what an
-impulse there can change. It is w that a law gets and changes. So laws mean what they do of particles: one that keeps
-the speed keeps the energy of the body, one along the normal gives an impulse along it, and a wall with a temperature
-keeps the canonical distribution of the body: in it K k_B T is the covariance of u, and no other part of it changes.
+An impulse P at a contact point changes its velocity by K P, where K is the (3, 3) inverse mass of the body there. With
+the normal n, m = 1/(n K n), and A = m (K_tt - m K_tn K_nt) across it, the velocity u relative to the wall is mapped to
+    w_n = u_n,   w_t = A^(-1/2) (u_t - m K_tn u_n),
+the velocity of a particle of mass m with the energy m w^2/2 = u K^-1 u/2, the part that an impulse there can change. A
+law acts on w. So laws have the same meaning as for particles: a law that conserves the speed conserves the energy of
+the body, and a law along the normal gives an impulse along it. A wall with a temperature preserves the canonical
+distribution of the body, in which K k_B T is the covariance of u, as no other part of it changes.
 """
 
 import math
@@ -22,28 +22,28 @@ from ...kernel.vector import ZERO, column, dot, square
 from .contacts import MOST_CONTACTS, direction, put_direction
 from .impact import body_impact, chatters
 
-# The smaller one of the two inverse masses across a normal counts as 0 where its part of the other is below this.
+# The ratio of the two inverse masses across a normal below which the smaller one counts as 0.
 _HELD = 1e-12
-# A squared speed into a wall is round-off up to this part of that of the fastest point.
+# The squared speed into a wall that is round-off, relative to that of the fastest point.
 _ROUND_OFF = (16.0 * EPSILON) ** 2
-# The speed into a wall of what rests there [m/s].
+# The speed into a wall of a resting contact [m/s].
 _AT_REST = 1e-300
 
 
 class Across(Record):
-    """A^(-1/2), (xx, xy, yy): 0 in directions in which the body cannot move."""
+    """The matrix A^(-1/2), (xx, xy, yy): 0 in directions in which the body cannot move."""
 
     xx: float
     xy: float
     yy: float
 
     def of(self, x, y):
-        """Its product with a vector."""
+        """The product of the matrix with a vector."""
         return self.xx * x + self.xy * y, self.xy * x + self.yy * y
 
 
 def across_of(schur, mass):
-    """`Across` of the inverse mass K of a contact in the directions of its normal and two tangents."""
+    """Return the `Across` of a contact, from its inverse mass K in the directions of the normal and two tangents."""
     xx = mass * (schur[1, 1] - mass * schur[0, 1] * schur[0, 1])
     xy = mass * (schur[1, 2] - mass * schur[0, 1] * schur[0, 2])
     yy = mass * (schur[2, 2] - mass * schur[0, 2] * schur[0, 2])
@@ -61,7 +61,7 @@ def across_of(schur, mass):
 
 @outlined
 def send_off(bodies, state, name, frame, found, i):
-    """Send a body off by the law of the first of these contacts at which one acts; whether there is any."""
+    """Send a body off by the law of the first of these contacts at which a law acts; return whether one does."""
     a, acts = 0, False
     while a < found and not acts:
         acts = _by_law(bodies, state, name, frame, (a, False), i)
@@ -71,7 +71,7 @@ def send_off(bodies, state, name, frame, found, i):
 
 @outlined
 def leave_rest(bodies, state, i):
-    """Send a body that rests on a wall with a temperature off; how many blows that is, 1 or 0."""
+    """Send a body off that rests on a wall with a temperature; return the number of blows, 1 or 0."""
     name, frame = scratch((MOST_CONTACTS, 2), np.int64), scratch((MOST_CONTACTS, 3, 3), np.float64)
     found = bodies.near(i, name, frame, False)
     for a in range(found):
@@ -83,7 +83,7 @@ def leave_rest(bodies, state, i):
 
 @outlined
 def _by_law(bodies, state, name, frame, contact, i):
-    """Send a body off by a law of a wall, at a contact (its number, whether it rests); whether a law acts."""
+    """Send a body off by a law at a `contact` (its number, whether it rests); return whether a law acts."""
     ties, touching, (a, rests) = bodies.ties, bodies.touching, contact
     m, number, w = ties.links + touching.guides, bodies.pace.body[i], name[a, 1]
     one, axes = scratch((1, 2), np.int64), scratch((1, 3, 3), np.float64)
@@ -99,7 +99,7 @@ def _by_law(bodies, state, name, frame, contact, i):
     if not rests and rate[0] * rate[0] <= _ROUND_OFF * _fastest(bodies, i):
         return False
     mass = 1.0 / blow.schur[0, 0]
-    # Every event has a number of its own: a body has a blow, or makes a step, between two.
+    # Every event has another number, as the body has a blow, or makes a step, between two events.
     event = MOST_CONTACTS * (state.impacts[number] + state.steps[number]) + a
     random = touching.random.of_impact(number, event, touching.laws)
     happens, sent = _sent(blow, state, rate, p, (mass, rests), random, i)
@@ -114,7 +114,7 @@ def _by_law(bodies, state, name, frame, contact, i):
         bodies.pace.remaining[i] = 0.0
         return True
     if sent.keeps:
-        # As at an elastic wall links keep the rates that steps have left them.
+        # As at an elastic wall, links keep the rates that steps have left.
         lost = 0.0
         for row_of_tie in range(m):
             against[row_of_tie] = 0.0
@@ -127,9 +127,9 @@ def _by_law(bodies, state, name, frame, contact, i):
 
 
 def _sent(blow, state, rate, p, at, random, i):
-    """Whether a law acts, and the `Bounce` by it; the impulses of the wall are p then.
+    """Return whether a law acts, and its `Bounce`; set p to the impulses of the wall.
 
-    `at`: the mass of the contact, and whether it rests.
+    `at` is the mass of the contact, and whether it rests.
     """
     bodies, schur, (mass, rests) = blow.bodies, blow.schur, at
     touching, walls, w = bodies.touching, bodies.walls_now(i), float(blow.name[0, 1])
@@ -157,7 +157,7 @@ def _fastest(bodies, i):
 
 
 def _book(state, laws, place, lost, work, dissipated):
-    """Book what a body has lost to a law, of which some is dissipated and the rest heat, and the work of walls."""
+    """Book the energy `lost` to a law, a part of which is dissipated and the rest heat, and the work of walls."""
     row, number = place
     taken = lost if laws.dissipate_all else dissipated
     state.dissipated[number] += taken

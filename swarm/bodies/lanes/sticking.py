@@ -1,11 +1,12 @@
 """Contacts that stick or come to rest at walls that take energy: their velocities, and steps too short for forces.
 
-A step that keeps the place of a contact turns its rate round, v1 = -v0, and that of a link at rest too: an error of
-second order in the length of the step that no force of a later step can damp. So a step in which a contact sticks ends
-with the velocities that its links and contacts permit.
+A step that keeps the place of a contact reverses its rate, v1 = -v0, and likewise the rate of a link at rest: an error
+of second order in the length of the step that no force of a later step can damp. So a step in which a contact sticks
+ends with the velocities that its links and contacts permit.
 
-The forces of a short step correct the round-off of places, over h a velocity: 1e-4 m/s in 1e-11 s, which moves the
-energy of a die by 1e-9 of itself. So where a step without forces keeps lengths and gaps to round-off, none acts.
+The forces of a short step correct the round-off of places, which divided by h is a velocity: 1e-4 m/s in 1e-11 s, which
+changes 1e-9 of the energy of a die. So no force acts in a step that conserves lengths and gaps to round-off without
+forces.
 """
 
 import math
@@ -27,13 +28,13 @@ def is_short(bodies, i):
 
 @outlined
 def leave_out(bodies, i):
-    """Leave out the forces of a short step that keeps lengths and gaps to round-off without them; whether it is one."""
+    """Leave out the forces of a short step that conserves lengths and gaps without them; return whether it does."""
     ties, rule, lanes, pace = bodies.ties, bodies.rule, bodies.lanes, bodies.pace
     if not is_short(bodies, i):
         return False
     for a in range(ties.links):
         y = column(lanes.p, 3 * ties.ends[a, 0], i) - column(lanes.p, 3 * ties.ends[a, 1], i)
-        # The change, not the length: to correct what steps before have left takes a force too.
+        # The change of the length, not its error: to correct the error of steps before takes a force too.
         if not abs(square(y) - square(column(lanes.y0, 3 * a, i))) <= rule.noise * ties.rest[a]:
             return False
     active = bodies.active
@@ -41,7 +42,7 @@ def leave_out(bodies, i):
         k, wall = active.name[i, a, 0], float(active.name[i, a, 1])
         before = bodies.walls_between(i).distance(wall, bodies.spot(lanes.ra, k, i))
         gap = bodies.walls_after(i).distance(wall, bodies.spot(lanes.p, k, i))
-        # Behind a wall that ends its distance is negative: the way there goes through it.
+        # The distance is negative behind a wall that ends, as the way there goes through the wall.
         behind = bodies.passed(k, bodies.touching.place(lanes.p, k, i), rule.room + max(before, 0.0), i).gap
         if not max(gap, behind) - before <= rule.room:
             return False
@@ -54,9 +55,9 @@ def leave_out(bodies, i):
 
 @outlined
 def stop(bodies, state, i):
-    """End a step of contacts of which one sticks, or a short one that loses energy, with velocities that they permit.
+    """End a step in which a contact sticks, or a short dissipative step, with velocities that ties and contacts permit.
 
-    The impulses of the step change by what is missing, within the cones of friction; what is lost is booked.
+    The impulses of the step are corrected within the cones of friction, and the energy lost is booked.
     """
     ties, touching, lanes, active = bodies.ties, bodies.touching, bodies.lanes, bodies.active
     number, found = bodies.pace.body[i], bodies.pace.active[i]
@@ -91,9 +92,9 @@ def stop(bodies, state, i):
 
 
 def _over_round_off(bodies, i):
-    """The energy that forces have taken over the round-off of places in a step; over more it is an error.
+    """The energy that forces have taken over the round-off of places in a step; 0 if more is missing, an error.
 
-    A short step that stops a contact has large ones: 10^5 N for a die that weighs 0.05 N, in 5e-12 s.
+    A short step that stops a contact has large forces: 10^5 N for a die that weighs 0.05 N, in 5e-12 s.
     """
     ties, lanes, pace, active = bodies.ties, bodies.lanes, bodies.pace, bodies.active
     if bodies.rule.stages.size > 1 or ties.links < ties.ends.shape[0] or max(ties.led) >= 0:
@@ -111,7 +112,7 @@ def _over_round_off(bodies, i):
 
 
 def _sticks(bodies, i):
-    """Whether a contact is held along its wall by less than its friction can."""
+    """Whether a contact is held along its wall by less than the limit of friction."""
     active, sticks = bodies.active, False
     for a in range(bodies.pace.active[i]):
         most = bodies.touching.friction[active.name[i, a, 1]] * active.press[i, 3 * a]

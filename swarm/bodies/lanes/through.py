@@ -1,7 +1,7 @@
-"""Walls that end, such as the facets of a mesh: which one the straight way of a contact point goes through.
+"""Walls with edges, such as the facets of a mesh: the first one that the straight way of a contact point crosses.
 
-Such a wall ends at its edges, and its distance says nothing of places that are deep behind it or in other cells. So the
-way from the start of a step to its end says which walls a contact point has passed.
+Such a wall is present only within its edges, and its distance says nothing about places deep behind it or in other
+cells. The way from the start to the end of a step tells which wall a contact point has passed.
 """
 
 import math
@@ -19,26 +19,26 @@ from ...surfaces.presence.patched import Patched
 
 
 class WayThrough(Record):
-    """The first wall that a way goes through."""
+    """The first wall that a way crosses."""
 
-    time: float  # the part of the way after which it does
-    wall: float  # its number, -1: it goes through none
-    gap: float  # how far the end of the way is from it [m]
+    time: float  # the part of the way before the crossing
+    wall: float  # the number of the wall, -1 for none
+    gap: float  # the distance of the end of the way from the wall [m]
 
 
 def have_ends(walls):
-    """Whether any wall of a scene ends: a constant for the compiler."""
+    """Whether any wall of a scene has edges: a constant for the compiler."""
     return any(_has_ends(field) for _number, field in walls.fields())
 
 
 def _has_ends(field):
-    # Of a foam the nearest cavity says whether a place is outside.
+    # In a foam, the nearest cavity tells whether a place is outside.
     members = members_of(field.members)
     return isinstance(members, Patched) and not isinstance(members, Foam)
 
 
 def is_of_ends(walls, wall):
-    """Whether the wall with this number ends."""
+    """Whether the wall with this number has edges."""
     found = False
     for number, field in walls.fields():
         if _has_ends(field):
@@ -47,9 +47,10 @@ def is_of_ends(walls, wall):
 
 
 def passed(before, after, start, end, limits):
-    """The first `WayThrough` of a way from its start, where the walls are `before`, to its end, where they are `after`.
+    """Return the first `WayThrough` of a way from `start`, with the walls `before`, to `end`, with the walls `after`.
 
-    `limits`: a start so little outside is at a wall; an end so near to one is at it; each wall is so much farther away.
+    `limits` are three lengths [m]: a start outside by at most the first one is at a wall; an end within the second one
+    of a wall is at it; each wall is moved back by the third one.
     """
     found = WayThrough(math.inf, -1.0, -math.inf)
     for (number, field), (_number, then) in reversed(tuple(zip(before.fields(), after.fields(), strict=True))):
@@ -79,7 +80,7 @@ def _pass(found, m, members, number, start, end, limits):
     back = select((outside > 0.0) & (outside <= near), outside, 0.0)
     begin = start - back * wall.unit_normal(start)
     time, _hits = wall.first_hit(begin, stop - begin)
-    # A way may go through the whole of a round wall.
+    # A way may cross a round wall twice.
     gap = abs(gap)
     sooner = (time <= 1.0) & (gap > room) & (time < found.time)
     return WayThrough(

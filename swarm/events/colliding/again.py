@@ -1,4 +1,4 @@
-"""All that is next for a ball, and its place in the queue."""
+"""The next events of a ball, and its place in the queue."""
 
 import math
 
@@ -12,7 +12,7 @@ from .window import OUT
 
 
 def aim_again(box, flock, i, now):
-    """Find all that is next for a ball with a velocity that has changed."""
+    """Find all next events of a ball after its velocity has changed."""
     until_exit(box.grid, box.pull, flock, i, now)
     forget_wall(flock, i)
     find_wall(box, flock, i, now)
@@ -20,7 +20,7 @@ def aim_again(box, flock, i, now):
 
 
 def stay(box, flock, i, now):
-    """Find what is next for a ball that a wall holds: it is let go, or another one collides with it before."""
+    """Find the next event of a held ball: its release, or a collision with another ball before."""
     flock.event[index(FLOATS * i + LEAVES)], flock.event[index(FLOATS * i + DUE)] = math.inf, flock.time(i)
     find_partner(box, flock, i, now)
 

@@ -1,4 +1,4 @@
-"""The impact of a ball on a wall: it is turned round, sent off by a law, held for a time, or gone."""
+"""The impact of a ball on a wall: the ball is reflected, sent off by a law, held for a time, or removed."""
 
 import math
 from typing import Any
@@ -20,20 +20,20 @@ from .followed import follow, settle
 from .rubbing import rub_wall
 from .window import HELD, walls_at
 
-# Besides a status that ends the run: it flies on, is no more among the walls, or is held by one.
+# The results of an impact besides a status that ends the run: the ball flies on, has left the walls, or is held.
 FLIES, GONE, STAYS = Status.DONE.value, -1, -2
-# Of a radius, how far a closed wall may be from a ball that an open one lets out.
+# The distance, as a part of the radius, up to which a closed wall touches a ball at an open wall.
 _TOUCH = 1e-9
-# A ball leaves a wall with at least this part of its speed: four roundings.
+# The least speed with which a ball leaves a wall, as a part of its speed: four roundings.
 _PARTS = 2.0**-50
-# Where the wall bends away under it, with no more than this part.
+# The bound of this least speed where the wall curves away under the ball, as a part of the speed.
 _ENOUGH = 0.25
-# A bound that is exceeded by this factor is exceeded whatever round-off does.
+# A bound exceeded by this factor is exceeded whatever round-off does.
 _SURELY = 1.01
 
 
 class Gates(Record):
-    """Where balls leave the walls, and when they did."""
+    """The openings through which balls leave the walls, and the times at which they left."""
 
     openings: Any  # None, or each `Opened`
     escape_time: Any  # (N,) [s], or None
@@ -43,7 +43,7 @@ class Gates(Record):
 
 @outlined
 def bounce(box, flock, books, clock, i, now):
-    """The impact of a ball on a wall: FLIES, GONE, or a status that ends the run."""
+    """Carry out the impact of a ball on a wall; return FLIES, GONE, STAYS, or a status that ends the run."""
     follow(box, flock, books, clock, i, now)
     r, v = flock.at(box.pull, i, now)
     wall, walls = flock.wall(i), walls_at(box, i, now)
@@ -75,14 +75,14 @@ def bounce(box, flock, books, clock, i, now):
 
 
 def press(box, flock, books, i, now, impulse):
-    """Book what a wall gets of the impulse on a ball that it holds, along its normal [N s]."""
+    """Book the normal part of an impulse [N s] on a held ball as an impulse on the wall that holds it."""
     wall, walls = HELD - flock.wall(i), walls_at(box, i, now)
     row = box.row(walls, wall)
     books.impulse[row, 0] += dot(walls.unit_normal(wall, flock.place(i)), impulse)
 
 
 def let_out(box, flock, books, clock, owner, ball):
-    """A ball has escaped through a wall with this number in the scene; it is given as in `_turned`."""
+    """Let a ball escape through the wall `owner` of the scene; `ball` is as in `_turned`."""
     i, now, r, v = ball
     box.gates.escape_time[index(i)] = moment_of(clock, now)
     settle(box, books, clock, i, now, r, v)
@@ -91,7 +91,7 @@ def let_out(box, flock, books, clock, owner, ball):
 
 
 def _end(box, flock, clock, wall, i, now, after):
-    """What becomes of a ball that the laws of a wall have sent off."""
+    """Return what happens to a ball after the laws of a wall have acted: FLIES, GONE, STAYS, or a failing status."""
     ended = FLIES
     if math.isnan(after.v.x):
         ended = Status.SENT_WRONG.value
@@ -105,27 +105,27 @@ def _end(box, flock, clock, wall, i, now, after):
 
 
 def _turned(box, flock, books, walls, wall, ball):
-    """The `Bounce` of a ball on a wall: its number, the time, its position and its velocity."""
+    """Return the `Bounce` of a ball on a wall; `ball` is its number, the time, its position and its velocity."""
     i, now, r, v = ball
     fall, laws, random = 2.0 * potential(box.pull, r), box.laws, None
     if box.turning is not None:
-        # Of a ball that turns, friction is below.
+        # The friction of a ball that turns is added below.
         laws = laws._replace(friction=None)
     if laws.send_off:
         random = box.source.of_impact(i, books.impacts[index(i)], laws)
     touch = None
-    # Along the normal a wall that turns is as fast at the centre of the ball.
+    # A turning wall has the same normal velocity at the centre of the ball: only friction and laws need the contact.
     if laws.moving is not None and (laws.friction is not None or laws.send_off):
         touch = r + box.kinds.radius_of(i) * walls.unit_normal(wall, r)
     arriving = Arriving(r, v, flock.kept(i, square(v) + fall), box.kinds.mass_of(i), touch=touch)
     turned = impact_on_wall(laws, walls, box.pull, wall, arriving, random)
     if box.loss is not None and laws.restitution is not None and box.loss.spares(flock, i, now):
         turned = impact_on_wall(laws._replace(restitution=None), walls, box.pull, wall, arriving, random)
-    # The energy decides the speed: the square of a velocity has a bias.
+    # The stored energy determines the speed, as the square of a velocity has a bias.
     v1 = either(turned.keeps, with_square(turned.v, turned.twice_energy - fall), turned.v)
     turned = turned._replace(v=v1)
     lifted = _lifted(box, walls, wall, r, turned)
-    # Friction takes of the whole normal impulse, with that of a contact that lasts.
+    # Friction acts by the whole normal impulse, with the one that lifts a ball in a lasting contact.
     if box.laws.friction is not None and not turned.is_sent:
         if box.turning is not None:
             return rub_wall(box.laws, walls, wall, box.turning, (i, box.kinds.radius_of(i), r), lifted)
@@ -136,24 +136,24 @@ def _turned(box, flock, books, walls, wall, ball):
 
 @outlined
 def _lifted(box, walls, wall, r, turned):
-    """The same `Bounce`, but at least so fast away from the wall that the flight back to it takes `box.shortest`.
+    """Return a `Bounce` at least so fast away from the wall that the flight back to it takes `box.shortest`.
 
-    The energy that the ball gains so is booked as a loss below 0, which the next impact takes back. The velocity along
-    the wall stays. Where walls lose no energy, the velocity is turned instead, and the speed stays.
+    The energy that the ball gains by this is booked as a negative loss, which the next impact takes back. The velocity
+    along the wall is kept. Where walls do not change the energy, the velocity is turned instead, and the speed is kept.
     """
     u = wall_velocity(box.laws.moving, walls, wall, r)
     w, pull = relative(u, turned.v), accelerated(box.pull, ZERO, 1.0)
-    # Where the wall bends away within that flight, a part of its speed is enough; on one that turns, it may go with it.
+    # Where the wall curves away within that flight, a part of the speed is enough; a turning wall may carry the ball.
     most = max(_ENOUGH * max(norm(w), norm(turned.v)), 0.5 * norm(pull) * box.shortest)
-    # Few leave so slowly that the wall is asked again.
+    # Few balls leave so slowly that the acceleration at the wall is needed.
     if 0.5 * turned.twice_away > _SURELY * max(most, _PARTS * norm(turned.v)):
         return turned
     n = walls.unit_normal(wall, r)
     away = -dot(n, w)
     held = walls.outward_acceleration(wall, r, turned.v + away * n, pull)
-    # At least so fast that its own velocity has digits of it
+    # Fast enough to be above the round-off of the ball's own velocity.
     least = max(min(0.5 * held * box.shortest, most), _PARTS * norm(turned.v))
-    # An absorbed ball stays as it is.
+    # An absorbed ball keeps its velocity.
     if away < least and turned.wait < math.inf:
         lift = least - away
         v, gained, work, speed2 = turned.v - lift * n, lift * (least + away), given(u, -lift * n), square(turned.v)
@@ -167,7 +167,7 @@ def _lifted(box, walls, wall, r, turned):
 
 
 def _rubbed(laws, walls, wall, arriving, bounce, impulse):
-    """The `Bounce` of a ball that does not turn, with the friction of a further normal impulse."""
+    """Return the `Bounce` of a ball that does not turn, with the friction of a further normal impulse."""
     n, u = walls.unit_normal(wall, arriving.r), wall_velocity(laws.moving, walls, wall, arriving.contact())
     w = relative(u, bounce.v)
     rubbed, taken = rub(laws, wall, n, w, impulse)
@@ -180,7 +180,7 @@ def _rubbed(laws, walls, wall, arriving, bounce, impulse):
 
 @outlined
 def _closed_wall(box, walls, wall, i, r, v):
-    """The wall that turns a ball round that meets this one, -1 for none: its foot is in an opening."""
+    """Return the wall that reflects a ball that meets `wall`: another one if its foot is in an opening, or -1."""
     if not _is_open(box, walls, wall, i, r):
         return wall
     number, touch = walls.numbers_near(r), _TOUCH * box.kinds.radius_of(i)

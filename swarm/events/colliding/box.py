@@ -1,4 +1,4 @@
-"""What balls are in, and what is booked of them, as the kernels of collisions take it."""
+"""The surroundings of balls, and the totals of their collisions, as the kernels of collisions take them."""
 
 from typing import Any, NamedTuple
 
@@ -9,7 +9,7 @@ from ...lanes.watching.watchers import Watchers
 
 
 class Domain(Record):
-    """What the balls are in: walls and their laws, gravity, cells, kinds of balls, what is lost of their energy."""
+    """The surroundings of the balls: walls and their laws, gravity, cells, kinds of balls, the loss of energy."""
 
     walls: Any
     laws: Any
@@ -17,15 +17,15 @@ class Domain(Record):
     grid: Any
     kinds: Any
     loss: Any  # None, or `Loss`
-    shortest: float  # the time that a flight from a wall back to it takes at least [s]
+    shortest: float  # the least time of a flight from a wall back to it [s]
     watchers: Watchers = Watchers()
     growth: Any = None  # `Growth` of balls that are packed
-    window: Any = None  # of walls that move, come or go: see window.py
+    window: Any = None  # the numbers of the window where walls move or become absent: see window.py
     gates: Any = None  # None, or `Gates` where balls may leave the walls
     heavy: Any = None  # None, or `Heavy` where walls have a mass
-    source: Any = None  # None, or `RandomSource` where walls send them off
+    source: Any = None  # None, or `RandomSource` where walls send balls off
     repose: Any = None  # None, or `Repose` where balls may come to rest
-    turning: Any = None  # None, or `BallSpins` of balls that have a spin
+    turning: Any = None  # None, or the `BallSpins`
     owners: Any = None  # the number in the scene of each wall without a mass; None if no wall has a mass
     rows: Any = None  # the row in the books of each wall without a mass; None if no wall has a mass
 
@@ -34,26 +34,26 @@ class Domain(Record):
         return wall if self.owners is None else float(self.owners[index(int(wall))])
 
     def row(self, walls, wall):
-        """The row of the books of one of these walls."""
+        """The row of a wall in the books."""
         return index(int(walls.row(wall) if self.rows is None else self.rows[index(int(wall))]))
 
 
 class CollisionTotals(NamedTuple):
-    """What is booked: of each ball, and of all."""
+    """The totals of a run, of each ball and of all."""
 
     impulse: Array  # (2 walls, 1)
     dissipated: Array  # (N,), or none
     impacts: Array  # (N,)
     virial: Array  # (1,)
-    image: Any = None  # (3, N) where the scene repeats
-    heat: Any = None  # (walls, 1) that walls gave [J], or None
-    mass: Any = None  # (N,) of balls
+    image: Any = None  # (3, N) in a periodic scene
+    heat: Any = None  # (walls, 1) the energy given by walls [J], or None
+    mass: Any = None  # (N,) the masses of balls [kg]
     crossed: Any = None  # `Crossed`, where there are counters
-    before: Any = None  # (N,) `impacts` when the frame began, where walls move
+    before: Any = None  # (N,) `impacts` at the start of the frame, where walls move
 
 
 class CollisionRule(NamedTuple):
-    """The end of the frame [s], and when to stop."""
+    """How far events are taken: the end of the frame [s], and the most events of the call."""
 
     end: float
-    halt: Array  # (1,) events
+    halt: Array  # (1,) the most events of the call

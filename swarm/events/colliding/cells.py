@@ -1,8 +1,8 @@
-"""Cells, each with the balls that have their centres in it: which balls meet before one of them leaves its cell.
+"""Cells, each with the balls that have their centres in it, in which collisions are looked for.
 
 No cell is shorter than the largest diameter, so that balls that touch are in the same cell or in neighbours. Each axis
-has one cell more at either end, which is empty, or stands for the one at the other end where the scene repeats. The
-outermost cells have no end where it does not.
+has one more cell at either end. It is empty, or stands for the cell at the other end if the axis is periodic. The
+outermost cells of an axis that is not periodic are unbounded.
 """
 
 import math
@@ -21,22 +21,22 @@ from .window import middle_of, swept
 class Axis(Record):
     """The cells along an axis: numbers 1 to `count`."""
 
-    low: float  # where the first one begins [m]
+    low: float  # the start of the first cell [m]
     width: float  # [m]
     count: int
-    offset: Array  # (count + 2) int32: what each adds to the number of a cell
+    offset: Array  # (count + 2) int32: the part of the number of a cell that each place on the axis adds
     period: Any  # [m], or None
-    last: Any  # the number before the period, or None
+    last: Any  # the largest float below the period, or None
 
     def nearest(self, b):
-        """The shortest of the distances along this axis of a particle and the images of another one."""
+        """The shortest of the signed distances along this axis from a particle to the images of another one."""
         if self.period is None:
             return b
         half = 0.5 * self.period
         return select(b > half, b - self.period, select(b < -half, b + self.period, b))
 
     def until_end(self, x, v, a, cell):
-        """How long a flight stays between the faces of a cell, and whether it leaves by the upper one."""
+        """Return how long a flight stays between the faces of a cell, and whether it leaves by the upper one."""
         low, high = self.low + (cell - 1) * self.width, self.low + cell * self.width
         if a is None:
             up = v > 0.0
@@ -63,7 +63,7 @@ class BallGrid(Record):
     y: Axis
     z: Axis
     near: Array  # bool, whether a ball in a cell may touch a wall
-    few: Any = None  # 1.0 where some axis has so few cells that two images of a ball may be near another one
+    few: Any = None  # 1.0 if an axis has so few cells that two images of a ball may be near another ball
 
     def axes(self):
         """The three axes."""
@@ -78,7 +78,7 @@ class BallGrid(Record):
 
 
 def until_exit(grid, pull, flock, i, now):
-    """Find when and by which face a ball leaves its cell, from a time on."""
+    """Find the time after `now` at which a ball leaves its cell, and the face by which it does."""
     r, v = flock.at(pull, i, now)
     first, face, a = math.inf, 0, (None, None, None) if pull is None else pull
     for k, (axis, cell) in enumerate(zip(grid.axes(), flock.cell(i), strict=True)):
@@ -90,7 +90,7 @@ def until_exit(grid, pull, flock, i, now):
 
 
 def put_in(flock, i, cell):
-    """Put a ball into a cell, as the first one of it."""
+    """Put a ball into a cell, as the first ball there."""
     flock.link[index(WHOLES * i + AFTER)] = flock.head[index(cell)]
     flock.head[index(cell)] = i
 
@@ -107,7 +107,7 @@ def take_out(flock, i, cell):
 
 
 def cross(grid, flock, i):
-    """Bring a ball into the cell that it enters now: (the axis, by how many periods it goes back)."""
+    """Move a ball into the cell that it enters now; return the axis, and by how many periods the ball goes back."""
     face, old = flock.face(i), grid.number(i, flock)
     which, step = face >> 1, 2 * (face & 1) - 1
     new, turns, cell = old, 0, 0
@@ -141,7 +141,7 @@ def mark_near(box, radius, plane):
             where, is_outer = (plane, ky, kz), False
             r = Vec(*(axis.low + (k - 0.5) * axis.width for axis, k in zip(grid.axes(), where, strict=True)))
             for axis, k in zip(grid.axes(), where, strict=True):
-                # Of a cell that has no end nothing is known.
+                # An unbounded cell may be near a wall anywhere.
                 if axis.period is None:
                     is_outer = (k <= 1) | (k >= axis.count) | is_outer
             number = (plane * (grid.y.count + 2) + ky) * (grid.z.count + 2) + kz
@@ -149,7 +149,7 @@ def mark_near(box, radius, plane):
 
 
 def _clear(walls, r, half):
-    """A lower bound of the distance of a place from all walls, within so long before and after where some move."""
+    """A lower bound of the distance of a place from all walls, for moving walls from `half` [s] before to after."""
     least = math.inf
     for wall in walls.each:
         least = min(_clear_of(wall, r) - swept(wall, r, half), least)

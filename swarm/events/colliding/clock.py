@@ -1,16 +1,16 @@
-"""The time of a run of balls, which is counted from the start of an epoch on."""
+"""The time of a run of balls, counted from the start of an epoch."""
 
 import math
 
-# Of a clock: how many epochs have ended, their length [s], events and collisions so far, the last ones at one time; how
-# far balls are to fly in an epoch, about [m]; impacts that are counted since a time [s since the start], how many of
-# them were slow, and when balls were found at rest first (see resting.py), 0 for never.
+# Entries of a clock: the number of epochs that have ended, their length [s], the events and the collisions so far, the
+# last events at one time, and the typical way of a ball in an epoch [m]. Then, of resting.py: the impacts since a time,
+# how many of them were slow, that time [s since the start], and the first time at which balls rested, 0 for never.
 EPOCHS, LENGTH, EVENTS, COLLISIONS, SAME, REACH = 0, 1, 2, 3, 4, 5
 IMPACTS, SLOW, SINCE, RESTED, CLOCK = 6, 7, 8, 9, 10
 
 
 def moment_of(clock, now):
-    """A time of the epoch since the start of the run [s]."""
+    """Return a time of the epoch as the time since the start of the run [s]."""
     return clock[EPOCHS] * clock[LENGTH] + now
 
 

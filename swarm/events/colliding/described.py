@@ -24,22 +24,22 @@ from .rows import AFTER, CELL, FLOATS, NO_PARTNER, PARTNER, STAMP, TIME, WALL, W
 from .rubbing import BallSpins
 from .window import OUT, UNKNOWN
 
-# Cells are longer than the largest diameter by this part: round-off of places.
+# Cells are longer than the largest diameter by this part, for round-off of places.
 _MARGIN = 1e-9
-# And not shorter than this many mean distances of balls.
+# Cells are no shorter than this factor times the mean distance of balls.
 _SPACING = 0.8
-# There are at most so many cells a ball, and a few.
+# The number of cells is at most `_CELLS` times the number of balls, plus `_FEW`.
 _CELLS, _FEW = 2.0, 64
-# Of fewer cells along a period a ball may have two images of another one in its own cell and its neighbours.
+# With fewer cells along a period, two images of a ball may be in the cells around another ball.
 _IMAGES = 4
-# Balls fly this part of the scene in an epoch, about.
+# The typical way of a ball in an epoch, as a part of the scene.
 _EPOCH = 0.125
-# t_c, if it is not given, is this part of the time in which balls fly their diameter; under gravity, by which contacts
-# last, the second part of that in which they fly or fall so far.
+# The default t_c is the part `_DURATION` of the time in which a ball flies its diameter. Under gravity, where contacts
+# last, it is the part `_FALL` of the time in which a ball flies or falls its diameter.
 _DURATION, _FALL = 1e-4, 1e-3
-# A flight from a wall back to it takes at least this part of an epoch: on a shorter one round-off is all there is.
+# The least time of a flight from a wall back to it, as a part of an epoch: a shorter flight is nothing but round-off.
 _SHORTEST = 2.0**-20
-# Temporary arrays are of so many balls, so that they are small beside what is kept of them.
+# Temporary arrays have this number of balls, so that they are small beside the arrays of the run.
 _AT_ONCE = 32_768
 
 
@@ -49,7 +49,7 @@ def _cell_along(axis: Axis, x: Any) -> Any:
 
 
 def flock_of(particles: Particles, grid: BallGrid, loses: bool) -> Flock:
-    """The balls at the start, in their cells."""
+    """Return the balls at the start, in their cells."""
     n = len(particles)
     flight, event = aligned(FLOATS * n), aligned(FLOATS * n)
     link, tag = flight.view(np.int32), event.view(np.int32)
@@ -64,7 +64,7 @@ def flock_of(particles: Particles, grid: BallGrid, loses: bool) -> Flock:
     key.fill(math.inf)
     np.subtract(node, FIRST, out=item[FIRST : FIRST + n])
     if particles.births is not None:
-        # In no cell, and nothing is next for them.
+        # Balls that are born later are in no cell, and have no next event.
         late = particles.births.source >= 0
         whole[late, WALL], whole[late, PARTNER] = OUT, NO_PARTNER
     last = np.full(n, -math.inf) if loses else None
@@ -72,7 +72,7 @@ def flock_of(particles: Particles, grid: BallGrid, loses: bool) -> Flock:
 
 
 def _linked(link: NDArray[np.int32], tag: NDArray[np.int32], grid: BallGrid) -> NDArray[np.int32]:
-    """Link the balls of each cell, those of the start: the first one of each cell."""
+    """Link the balls of each cell at the start; return the first ball of each cell."""
     whole, after = tag.reshape(-1, WHOLES), link.reshape(-1, WHOLES)[:, AFTER]
     head = np.full(grid.near.size, NO_PARTNER, np.int32)
     for first in range(0, len(whole), _AT_ONCE):
@@ -81,7 +81,7 @@ def _linked(link: NDArray[np.int32], tag: NDArray[np.int32], grid: BallGrid) -> 
             cell = np.zeros(left.size, np.int32)
             for k, axis in enumerate(grid.axes()):
                 cell += axis.offset[whole[left, CELL + k]]
-            # Of those in one cell the last one is put in; the others follow.
+            # Of several balls in one cell the last one is linked; the others follow in the next rounds.
             before, head[cell] = head[cell], left
             is_in = head[cell] == left
             after[left[is_in]] = before[is_in]
@@ -104,11 +104,11 @@ def come(flock: Flock, grid: BallGrid, i: int, now: float, position: Floats, vel
 
 
 def there_at(flock: Flock, radius: Floats, pull: Any, now: float) -> tuple[Floats, Floats, Floats]:
-    """The balls that are in the vessel at a time of the epoch [s]: places and velocities (3, n), radii (n,)."""
+    """Return the places and velocities (3, n) and radii (n,) of the balls present at a time of the epoch [s]."""
     n = flock.number()
     there = flock.tag.reshape(n, WHOLES)[:, WALL] != OUT
     rows = flock.flight.reshape(n, FLOATS)[there]
-    # The flight of a ball that is held begins later.
+    # The flight of a held ball begins later.
     way = np.maximum(now - rows[:, TIME], 0.0)
     fall = np.zeros((3, 1)) if pull is None else np.array([tuple(pull)]).T
     position = rows[:, :3].T + rows[:, 3:6].T * way + 0.5 * fall * way * way
@@ -116,7 +116,7 @@ def there_at(flock: Flock, radius: Floats, pull: Any, now: float) -> tuple[Float
 
 
 def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Flock, float]:
-    """What the balls are in, these at the start, and the length of an epoch [s]."""
+    """Return the `Domain` of the balls, the balls at the start, and the length of an epoch [s]."""
     assert particles.radius is not None
     scene = compiled.scene
     scenery = scenery_of(compiled, 0.0)
@@ -135,14 +135,14 @@ def described(compiled: CompiledScene, particles: Particles) -> tuple[Domain, Fl
     kinds = kinds_of(particles, laws.may_wait)
     if laws.may_wait:
         flock = flock._replace(holds=1.0)
-    # Also where nothing is lost: balls may start at rest on a floor.
+    # Rest is also possible without a loss of energy, as balls may start at rest on a floor.
     repose = None if scene.gravity is None else repose_of(math.hypot(*scene.gravity), particles.radius)
     made = Domain(scenery.given, laws, scene.pull(), grid, kinds, loss, shortest, repose=repose, turning=turning)
     return made, flock, epoch
 
 
 def kinds_of(particles: Particles, may_be_held: bool) -> Any:
-    """The radii and masses of balls."""
+    """Return the kind of the balls: their radii and masses."""
     radius, mass = particles.radius, particles.mass
     assert radius is not None
     if not may_be_held and np.ptp(radius) == 0.0 and np.ptp(mass) == 0.0:
@@ -153,8 +153,8 @@ def kinds_of(particles: Particles, may_be_held: bool) -> Any:
 
 
 def speed_of(scene: Scene, particles: Particles) -> float:
-    """The root mean square speed of balls at the start, or that of the fastest wall [m/s]."""
-    # Row by row: the squares of all components at once are the largest array of a run for a moment.
+    """The root mean square speed of balls at the start, or the speed of the fastest wall if larger [m/s]."""
+    # Rows are squared one by one; the squares of all components would for a moment be the largest array of the run.
     squares = np.zeros(len(particles))
     for row in particles.velocity:
         squares += row * row
@@ -168,7 +168,7 @@ def speed_of(scene: Scene, particles: Particles) -> float:
 
 
 def duration_of(scene: Scene, pairs: Pairs, particles: Particles) -> float:
-    """t_c of a run [s]."""
+    """The contact duration t_c of a run [s]."""
     assert particles.radius is not None
     if pairs.contact_duration is not None:
         return pairs.contact_duration
@@ -179,7 +179,7 @@ def duration_of(scene: Scene, pairs: Pairs, particles: Particles) -> float:
 
 
 def reach_of(grid: BallGrid) -> float:
-    """How far balls are to fly in an epoch [m], about."""
+    """The typical way of a ball in an epoch [m]."""
     return float(_EPOCH * max(axis.width * axis.count for axis in grid.axes()))
 
 
@@ -193,7 +193,7 @@ def _epoch_of(scene: Scene, particles: Particles, grid: BallGrid) -> float:
 
 
 def grid_of(scene: Scene, particles: Particles) -> BallGrid:
-    """The cells of a scene, which are not shorter than the largest diameter."""
+    """Return the cells of a scene, no shorter than the largest diameter."""
     low, high = _region(scene, particles)
     radius = particles.radius
     assert radius is not None
@@ -224,7 +224,7 @@ def grid_of(scene: Scene, particles: Particles) -> BallGrid:
 
 
 def _region(scene: Scene, particles: Particles) -> tuple[Floats, Floats]:
-    """The box that the cells fill: of the walls, or of the start where these have no end."""
+    """Return the corners of the box of the cells: the bounds of the walls, or of the start along unbounded axes."""
     low, high = (np.array(corner, float) for corner in scene.bounds())
     radius = particles.radius
     assert radius is not None

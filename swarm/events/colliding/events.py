@@ -1,10 +1,10 @@
-"""The events of balls in order of time: collisions, impacts on walls, ways from cell to cell.
+"""The events of balls in order of time: collisions, impacts on walls, passages from cell to cell.
 
-One thread takes them. An event is the first of all: of equal times that of the ball with the smaller number, and of one
-ball its collision with the smaller partner before a wall, a wall before the end of a cell. So touching balls that are
-hit, as in Newton's cradle, hand the blow on one by one at one time.
+One thread takes the events, the earliest one first. At equal times the ball with the smaller number comes first. The
+collision of a ball, with the smaller partner first, comes before a wall, and a wall before the end of the cell. So
+touching balls in a row pass on a collision one by one at one time, as in Newton's cradle.
 
-Frames look at the balls and change no flight, so that a run has the same bits with more of them or fewer.
+Frames read the balls and change no flight, so that a run has the same bits for any number of frames.
 """
 
 import math
@@ -29,25 +29,25 @@ from .rows import DUE, FLOATS, LEAVES, MEETS, MET, NO_PARTNER, PARTNER, SEEN, ST
 from .striking import renew_ended, shift_leases, strike_heavy
 from .window import END, HELD, OUT
 
-# So many events a ball between which no time passes: then time does not pass at all.
+# Time does not pass at all if a ball has this number of events at one time.
 _AT_ONCE = 1000
-# Counts of 32 bits begin anew after so many events, of which each counts a few times at most: two balls take less than
-# an hour to pass 2^31, and there is no room for longer numbers in a row.
+# Counts of 32 bits begin anew after this number of events, each of which adds a few at most. Two balls pass 2^31 in
+# less than an hour, and a row has no room for longer numbers.
 _COUNTED = 2**28
 
 
-# --- Of one ball -------------------------------------------------------------------------------------------
+# --- Events of one ball ------------------------------------------------------------------------------------
 
 
 @outlined
 def _collide(box, flock, books, clock, i, now):
-    """The collision of a ball, if its partner still has the flight that it had; else it looks for another one."""
+    """Carry out the collision of a ball if its partner still has the same flight; else find its next collision."""
     j = flock.tag[index(WHOLES * i + PARTNER)]
     if flock.tag[index(WHOLES * j + STAMP)] != flock.tag[index(WHOLES * i + SEEN)]:
         find_partner(box, flock, i, now)
         queue_both(flock, i)
     else:
-        # The one with the smaller number first
+        # The ball with the smaller number is first.
         one, other = min(i, j), max(i, j)
         follow(box, flock, books, clock, one, now)
         follow(box, flock, books, clock, other, now)
@@ -76,7 +76,7 @@ def _collide(box, flock, books, clock, i, now):
 
 
 def _send(box, flock, books, ball, before, now):
-    """Store the flight of a ball, its number, its place and its velocity, after a collision; one that is held stays."""
+    """Store the flight of a `ball` (number, place, velocity) after a collision; a held ball stays where it is."""
     i, r, v = ball
     if flock.is_held(i, now):
         press(box, flock, books, i, now, box.kinds.mass_of(i) * (v - before))
@@ -96,7 +96,7 @@ def _book(flock, books, clock, pair, blow, now):
 
 
 def _at_wall(box, flock, books, clock, i, now):
-    """What comes when a ball may meet a wall: it is reflected, or gone, or looks farther; a status if it goes wrong."""
+    """Carry out the event of a ball at a wall: an impact, a release, or a new search; return FLIES, or a failure."""
     if box.heavy is not None:
         if flock.wall(i) >= first_number(box):
             return strike_heavy(box, flock, books, clock, i, now)
@@ -132,7 +132,7 @@ def _at_given_wall(box, flock, books, clock, i, now):
         elif ended == FLIES:
             aim_again(box, flock, i, now)
             queue_both(flock, i)
-            # Walls that close on a ball hit it without end, each time sooner.
+            # Walls that close on a ball hit it without end, in ever shorter times.
             if books.before is not None and books.impacts[index(i)] - books.before[index(i)] > MOST_HITS:
                 ended = Status.STALLED.value
     else:
@@ -142,9 +142,9 @@ def _at_given_wall(box, flock, books, clock, i, now):
 
 @outlined
 def _let_go(box, flock, books, i, now):
-    """A ball leaves the wall that has held it."""
+    """Release a ball from the wall that has held it."""
     box.kinds.let_go(i, books.mass[index(i)])
-    # With another stamp: a ball that was to meet it there looks anew.
+    # `put` changes the stamp, so that a ball that was to meet it there looks anew.
     twice = flock.kept(i, square(flock.velocity(i)) + 2.0 * potential(box.pull, flock.place(i)))
     flock.put(i, now, flock.place(i), flock.velocity(i))
     flock.keep(i, twice)
@@ -154,7 +154,7 @@ def _let_go(box, flock, books, i, now):
 
 @outlined
 def _enter(box, flock, books, clock, i, now):
-    """The way of a ball into the next cell."""
+    """Move a ball into its next cell."""
     if books.image is not None:
         follow(box, flock, books, clock, i, now)
     r, v = flock.at(box.pull, i, now)
@@ -164,7 +164,7 @@ def _enter(box, flock, books, clock, i, now):
     if books.image is not None:
         books.image[index(which), index(i)] += turns
     if turns != 0:
-        # There it meets other images of the walls.
+        # There the ball meets other images of the walls.
         forget_wall(flock, i)
         flock.keep(i, math.nan)
     found = look_ahead(box, flock, i, now)
@@ -177,27 +177,27 @@ def _enter(box, flock, books, clock, i, now):
             requeue(flock, partner)
 
 
-# --- Of all ----------------------------------------------------------------------------------------------
+# --- Events of all balls ---------------------------------------------------------------------------------
 
 
 @long_kernel
 def mark(box, radius, first, last):
-    """Mark which cells are near walls, in the planes of cells from `first` to before `last`."""
+    """Mark the cells near walls, in the planes of cells from `first` to before `last`."""
     for plane in range(first, last):
         mark_near(box, radius, plane)
 
 
 @long_kernel
 def next_epoch(flock, clock):
-    """Begin the epoch after this one, at its end."""
+    """Begin the next epoch at the end of this one."""
     _begin_epoch(flock, clock, clock[LENGTH])
 
 
 @long_kernel
 def begin(box, flock, now, first, last):
-    """Find what is next for the balls from `first` to before `last`, at the start, which is before time 0.
+    """Find the next events of the balls from `first` to before `last`.
 
-    At the start this is the next event of each ball. Later, where a window begins, it is only the next wall of each.
+    At the start, where `now` is negative, these are all events. At the start of a window, only walls are looked for.
     """
     for i in range(first, last):
         if flock.wall(i) <= OUT:
@@ -212,7 +212,7 @@ def begin(box, flock, now, first, last):
 
 @long_kernel
 def welcome(box, flock, i, now):
-    """Find what is next for a ball that is born at a time of the epoch [s]."""
+    """Find the next events of a ball that is born at a time of the epoch [s]."""
     aim_again(box, flock, i, now)
     queue_both(flock, i)
 
@@ -225,9 +225,9 @@ def order(flock):
 
 @outlined
 def _begin_epoch(flock, clock, now):
-    """Count all times from a later one on, so that they keep their digits: how much later [s].
+    """Shift the zero of all times to a later time, so that they keep their digits; return the shift [s].
 
-    It is a multiple of a power of two, so that times lose less than the round-off of one epoch.
+    The shift is a multiple of a power of two, so that times lose less than the round-off of one epoch.
     """
     number = float(int(now / clock[LENGTH]))
     shift = number * clock[LENGTH]
@@ -256,7 +256,7 @@ def _begin_counts_anew(flock):
 
 
 def _pass_epoch(box, flock, clock, now):
-    """`_begin_epoch`, and the length of this one, where no window ends with it."""
+    """Begin an epoch, and fit its length if no window ends with it; return the shift [s]."""
     shift = _begin_epoch(flock, clock, now)
     if box.window is None:
         fit(clock, _speed2(box, flock, clock))
@@ -265,7 +265,7 @@ def _pass_epoch(box, flock, clock, now):
 
 @outlined
 def _speed2(box, flock, clock):
-    """The mean square of the speed, at least that of a fall as far as balls are to fly in an epoch."""
+    """The mean square of the speed, at least that of a fall by the typical way of an epoch."""
     whole = 0.0
     for i in range(flock.number()):
         whole += square(flock.velocity(i))
@@ -274,14 +274,14 @@ def _speed2(box, flock, clock):
 
 
 def _first(box, flock, clock, end):
-    """The ball and the time of the first event, with new leases of walls where they end before it."""
+    """Return the ball and the time of the first event; renew leases of walls that end before it."""
     if box.heavy is not None:
         renew_ended(box, flock, clock, end)
     return flock.item[FIRST], flock.key[FIRST]
 
 
 def _is_over(box, end, now):
-    """The status with which no event is taken at a time; -1 where one is."""
+    """The status that ends the call before an event at a time; -1 if the event is to be taken."""
     ended = select(now < end, -1, Status.DONE.value)
     if box.watchers.log is not None:
         ended = select((ended < 0) & is_full(box.watchers.log), Status.LOG_FULL.value, ended)
@@ -292,10 +292,10 @@ def _is_over(box, end, now):
 
 @long_kernel
 def take(box, flock, books, clock, rule):
-    """Take event after event until the end of the frame: (status, ball).
+    """Take event after event until the end of the frame; return the status and the ball.
 
-    LEASE_ENDED where the window of walls that move has ended. LOG_FULL where the log needs an empty part. INTERRUPTED
-    after so many events as the rule says; it goes on with the same bits.
+    The status is LEASE_ENDED at the end of a window, and LOG_FULL where the log needs an empty part. It is INTERRUPTED
+    after `rule.halt` events; a later call goes on with the same bits.
     """
     end, taken = rule.end - clock[EPOCHS] * clock[LENGTH], 0
     most = float(_AT_ONCE * flock.number())
@@ -334,7 +334,7 @@ def take(box, flock, books, clock, rule):
 
 @long_kernel
 def follow_all(box, flock, books, clock, now, first):
-    """Tell counters of the flights of the balls from `first` on until now: how far, before the log is full."""
+    """Count the crossings of the balls from `first` on until now; return where the log is full, or their number."""
     for i in range(first, flock.number()):
         if is_full(box.watchers.log):
             return i
@@ -345,27 +345,27 @@ def follow_all(box, flock, books, clock, now, first):
 
 @long_kernel
 def show(box, flock, state, end, first, last):
-    """Write the balls from `first` to before `last` to the arrays of a frame, as they are at a time of the epoch."""
+    """Write the balls from `first` to before `last`, at a time of the epoch, to the arrays of a frame."""
     for k in range(first, last):
         i = index(k)
         r, v = flock.at(box.pull, k, end)
         if box.gates is not None and flock.wall(k) == OUT:
             r, v = flock.place(k), flock.velocity(k)
-        # That with which it leaves
+        # The velocity with which a held ball leaves.
         v = either(flock.is_held(k, end), flock.velocity(k), v)
         for axis, cells in enumerate(box.grid.axes()):
             x = r[axis]
             if cells.period is not None:
-                # Round-off at a face
+                # Round-off at a face may leave the cell.
                 x = select(x < 0.0, 0.0, select(x >= cells.period, cells.last, x))
             state.position[axis, i] = x
         put(state.velocity, 0, i, v)
 
 
 def fetch_next(box, flock):
-    """Ask for what the events of the nodes below the first need, and for the cells around the first of them.
+    """Fetch the rows of the events below the first node, and the cells around the ball of the earliest of them.
 
-    They are on their way while this event is taken: of a million balls, a third of the time.
+    They arrive while the first event is taken: with a million balls, this saves a third of the time.
     """
     soonest, then = math.inf, 0
     for child in range(4, 8):

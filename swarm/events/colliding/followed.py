@@ -1,4 +1,4 @@
-"""Counters of balls: they get each flight where it ends, where it leaves the cell, and at the end of a frame."""
+"""Counters of balls. They read each flight at its end, at a face of the periodic cell, and at the end of a frame."""
 
 from ...kernel.arrays import index
 from ...kernel.jit import outlined
@@ -9,7 +9,7 @@ from .clock import moment_of
 
 
 def follow(box, flock, books, clock, i, now):
-    """Tell the counters of the flight of a ball until now, from where they know it."""
+    """Count the crossings of the flight of a ball until now, from where it was counted last."""
     if box.watchers.counters is not None and not flock.is_held(i, now):
         _tell(box, flock, books, clock, i, now)
 
@@ -29,7 +29,7 @@ def _left(box, clock, now):
 
 @outlined
 def come_over(box, flock, books, clock, ball):
-    """Count a ball, its number, the time, its place and velocity, that has come over a face of a cell that repeats."""
+    """Count a ball that has crossed a face of the periodic cell; `ball` is its number, time, place and velocity."""
     i, now, r, v = ball
     settle(box, books, clock, i, now, r, v)
     r, v = flock.at(box.pull, i, now)
@@ -38,7 +38,7 @@ def come_over(box, flock, books, clock, ball):
 
 
 def settle(box, books, clock, i, now, r, v):
-    """Count a ball at a counter, if it goes on from there without another look."""
+    """Count a ball that is at a counter and goes on through it, as its flight is not looked at again."""
     if box.watchers.counters is not None:
         there = ParticleMoment(r, v, _left(box, clock, now))
         box.watchers.counters.settle(Followed(books, box.watchers.log), i, there)

@@ -1,8 +1,8 @@
-"""Walls with a mass among balls: the balls near them, and when these meet them if nothing strikes the walls before.
+"""Walls with a mass among balls: the balls near them, and their next hits on undisturbed walls.
 
-A ball that is far from them is looked at again after a time in which it surely meets none, whatever impacts do to the
-walls within their leases. The next hit of a ball that is near holds until a wall is struck. All are looked at again
-when a lease ends.
+A ball far from these walls is looked at again after a time in which it surely meets none of them, whatever impacts do
+to the walls within their leases. The next hit of a near ball is valid until a wall is struck. All balls are looked at
+again when a lease ends.
 """
 
 import math
@@ -18,21 +18,21 @@ from .clock import LENGTH, moment_of
 from .rows import DUE, FLOATS, LEAVES
 from .window import UNKNOWN
 
-# Of the counts: balls that are listed, strikes of the walls so far, and events before the leases.
+# Entries of the counts: the balls listed, the strikes of the walls so far, and the events before the leases.
 LISTED, STRIKES, SINCE, COUNTS = 0, 1, 2, 3
 
 
 class Heavy(Record):
-    """The walls with a mass; their numbers follow those of all other walls."""
+    """The walls with a mass; their numbers follow the numbers of all other walls."""
 
     walls: Any  # each `Reacting`
     ways: Any  # the `Freedom` of each surface with a mass
-    freedoms: Any  # of times of the epoch
+    freedoms: Any  # `Freedoms`, with times of the epoch
     clock: Array
     counts: Array  # (3,)
-    near: Array  # (N,) bool, whether what is known of a ball holds only until a wall is struck
-    listed: Array  # (N,) bool, whether it is in `close`
-    close: Array  # (N,) int64, those that are near, and some that were
+    near: Array  # (N,) bool, whether the next hit of a ball is valid only until a wall is struck
+    listed: Array  # (N,) bool, whether the ball is in `close`
+    close: Array  # (N,) int64, the balls that are near, and some that were
 
     def grown(self, radius):
         """The walls that the centre of a ball meets."""
@@ -52,12 +52,12 @@ def first_number(box):
 
 
 def meet_heavy(box, flock, i, now, hit):
-    """Find when a ball meets any wall, from its `Hit` on those without a mass."""
+    """Find when a ball meets any wall, from its `Hit` on the walls without a mass."""
     heavy, row = box.heavy, FLOATS * i
     r, v = flock.at(box.pull, i, now)
     due, leaves, known = now + hit.time, flock.event[index(row + LEAVES)], hit.wall
     target = min(min(due, leaves), now + heavy.clock[LENGTH])
-    # At the end of its cell it looks again anyway.
+    # At the end of its cell the ball looks again anyway.
     if target < due:
         due, known = select(leaves <= target, math.inf, target), UNKNOWN
     flight = ParticleFlight(r, v, ZERO if box.pull is None else box.pull, now, target - now)

@@ -1,4 +1,4 @@
-"""The collision of two balls: equal and opposite impulses, and the energy of the pair as it is to be."""
+"""The collision of two balls: equal and opposite impulses, with the prescribed energy of the pair."""
 
 import math
 from typing import Any
@@ -10,7 +10,7 @@ from ...kernel.vector import dot, square, with_square
 from .next_collision import between
 from .rubbing import rub_pair
 
-# The square of the part of their speeds with which balls part at least: four roundings.
+# The square of the least speed at which balls part, as a part of their speeds: four roundings.
 _PARTS = 2.0**-100
 
 
@@ -18,7 +18,7 @@ class Loss(Record):
     """The loss of energy in collisions."""
 
     restitution: float
-    duration: float  # t_c [s]: a ball that met another one less than this ago loses no energy
+    duration: float  # t_c [s]: a ball that collided less than this ago loses no energy
 
     def spares(self, flock, i, now):
         """Whether a ball loses no energy in an impact now, on a ball or on a wall."""
@@ -26,7 +26,7 @@ class Loss(Record):
 
 
 class Met(Record):
-    """A collision: the velocity of one and the other after it, r_ij . J_ij [J s], and the energy that is lost [J]."""
+    """A collision: both velocities after it, r_ij . J_ij [J s], and the energy that is lost [J]."""
 
     one: Any
     other: Any
@@ -35,7 +35,7 @@ class Met(Record):
 
 
 def turned(u, n, closing, distance2, restitution):
-    """The relative velocity after a collision, with |u|^2 less what is lost restored, and twice what is lost."""
+    """Return the relative velocity w after a collision, scaled to |w|^2 = |u|^2 - lost, and `lost`: twice the loss."""
     e = 1.0 if restitution is None else restitution
     share = (1.0 + e) * closing / distance2
     w = u - share * n
@@ -44,9 +44,9 @@ def turned(u, n, closing, distance2, restitution):
 
 
 def _parted(u, b, distance2, speed2):
-    """A relative velocity that parts two balls by at least the round-off of their own speeds, |v|^2 + |w|^2.
+    """Return a relative velocity that parts two balls by at least round-off; `speed2` is |v|^2 + |w|^2 of both.
 
-    Without this, two balls that touch and fly on together would collide without end.
+    Otherwise two balls that touch and fly on together would collide without end.
     """
     away, least2 = dot(b, u), _PARTS * speed2 * distance2
     slow = (away < 0.0) | (away * away < least2)
@@ -54,7 +54,7 @@ def _parted(u, b, distance2, speed2):
 
 
 def met(box, flock, one, two, now):
-    """The `Met` of two balls that touch now, each as its number, its position and its velocity; it turns them too."""
+    """Collide and turn two balls that touch now; return the `Met`. Each is its number, position and velocity."""
     (i, r, v), (j, other, w) = one, two
     b, u = between(box.grid, r, other), w - v
     closing, distance2 = dot(b, u), square(b)

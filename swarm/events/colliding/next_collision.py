@@ -1,8 +1,8 @@
-"""The next collision of a ball with another one, and the time at which it meets a wall.
+"""The next collision of a ball with another ball, and its next hit on a wall.
 
-A ball has one collision of its own, the soonest. One that its partner would have after another does not count: then
-the partner has another flight, or looks again. So of two balls at least one knows of their collision, or has another
-one before it.
+A ball has one next collision, the soonest. A collision that the partner would have after another one does not count:
+by then the partner has another flight, or looks again. So at least one of two balls that collide stores their
+collision, or has another collision before it.
 """
 
 import math
@@ -21,18 +21,18 @@ from .heavy import meet_heavy
 from .rows import DUE, FLOATS, MEETS, NO_PARTNER, PARTNER, SEEN, STAMP, WHOLES
 from .window import OUT, UNKNOWN, next_hit
 
-# Cells around a ball, its own included, and how many balls of them are looked at at once.
+# The cells around a ball, its own included, and the most balls in them that are looked at together.
 _CELLS, _MOST = 27, 128
-# The mass of a ball that a wall holds [kg]: that of two is then the other one's, to the last bit.
+# The mass of a held ball [kg]: the reduced mass of a collision is then the mass of the other ball, to the last bit.
 FIXED = 2.0**200
-# So many parts a fall beside a ball that is held has at most, in each of which it surely meets it or not.
+# The most parts of a fall beside a held ball; in each part a hit is certain or excluded.
 _PARTS = 100
-# Of the cells around a ball: those beyond no face alone.
+# This stands for all cells around a ball, in place of a face.
 _ANY = 6
 
 
 class NextCollision(NamedTuple):
-    """A collision of a ball: its time [s since the epoch], and the other ball."""
+    """A collision of a ball: its time [s of the epoch], and the other ball."""
 
     time: Any
     mate: Any
@@ -46,118 +46,118 @@ class Alike(Record):
     reach2: float  # the square of a diameter
 
     def is_held(self, i):
-        """Whether a wall holds it."""
+        """Whether a wall holds a ball."""
         return False
 
     def radius_of(self, i):
-        """Its radius [m]."""
+        """The radius of a ball [m]."""
         return self.radius
 
     def mass_of(self, i):
-        """Its mass [kg]."""
+        """The mass of a ball [kg]."""
         return self.mass
 
     def ask(self, i):
-        """Ask for what is needed of a ball soon."""
+        """Fetch the numbers of a ball that are needed soon."""
 
     def share(self, i, j):
-        """The part that ball j has of the mass of both."""
+        """The mass of ball j as a part of the mass of both balls."""
         return 0.5
 
     def touching2(self, i, j):
-        """The square of the distance at which two touch."""
+        """The square of the distance at which two balls touch [m^2]."""
         return self.reach2
 
 
 class Various(Record):
-    """Balls of any radii and masses, each in one line of the cache (measured apart: a collision takes 1.3 times)."""
+    """Balls of any radii and masses, each in one line of the cache (in two arrays, a collision takes 1.3 times)."""
 
-    size: Array  # (2 N): of each ball its radius [m] and its mass [kg]
+    size: Array  # (2 N): the radius [m] and the mass [kg] of each ball
 
     def is_held(self, i):
-        """Whether a wall holds it."""
+        """Whether a wall holds a ball."""
         return False
 
     def radius_of(self, i):
-        """Its radius [m]."""
+        """The radius of a ball [m]."""
         return self.size[index(2 * i)]
 
     def mass_of(self, i):
-        """Its mass [kg]."""
+        """The mass of a ball [kg]."""
         return self.size[index(2 * i + 1)]
 
     def ask(self, i):
-        """Ask for what is needed of a ball soon."""
+        """Fetch the numbers of a ball that are needed soon."""
         fetch(self.size, 2 * i)
 
     def share(self, i, j):
-        """The part that ball j has of the mass of both."""
+        """The mass of ball j as a part of the mass of both balls."""
         other = self.mass_of(j)
         return other / (self.mass_of(i) + other)
 
     def touching2(self, i, j):
-        """The square of the distance at which two touch."""
+        """The square of the distance at which two balls touch [m^2]."""
         reach = self.radius_of(i) + self.radius_of(j)
         return reach * reach
 
 
 class Holdable(Various):
-    """Balls that walls may hold: meanwhile they are obstacles at rest for others."""
+    """Balls that walls may hold; a held ball is an obstacle at rest for others."""
 
     def masses(self):
-        """(N,) the masses, or `FIXED` [kg]."""
+        """The masses (N,) [kg], `FIXED` of held balls."""
         return self.size[1::2]
 
     def hold(self, i):
-        """A wall holds it from now on."""
+        """Mark a ball as held by a wall."""
         self.size[index(2 * i + 1)] = FIXED
 
     def let_go(self, i, mass):
-        """Nothing holds it any more."""
+        """Mark a ball as free, with its mass [kg]."""
         self.size[index(2 * i + 1)] = mass
 
     def is_held(self, i):
-        """Whether a wall holds it."""
+        """Whether a wall holds a ball."""
         return self.mass_of(i) == FIXED
 
 
 def between(grid, r, other):
-    """The way from one place to the nearest image of another one."""
+    """The vector from a place to the nearest image of another place."""
     return Vec(*(axis.nearest(b - a) for axis, a, b in zip(grid.axes(), r, other, strict=True)))
 
 
 def meeting(closing, gap, discriminant):
-    """How long two balls fly before they touch, without cancellation; where they are too near by round-off, 0."""
+    """The time until two balls touch, computed without cancellation; 0 if they overlap by round-off."""
     time = gap / (math.sqrt(discriminant) - closing)
     return select(time > 0.0, time, 0.0)
 
 
 class Sight(NamedTuple):
-    """Two balls, as one sees the other: b.u, b^2 less what it is where they touch, and a fourth of a discriminant."""
+    """The relative motion of two balls: b.u, b^2 minus its value at contact, and a fourth of the discriminant."""
 
     closing: Any
     gap: Any
     discriminant: Any
 
     def meets(self):
-        """Whether they will touch."""
+        """Whether the balls will touch."""
         return (self.closing < 0.0) & (self.discriminant > 0.0)
 
 
 def sight(b, u, touching2):
-    """The `Sight` of a ball that is b away and moves by u."""
+    """Return the `Sight` of a ball at the distance vector b with the relative velocity u."""
     closing, gap = dot(b, u), square(b) - touching2
     return Sight(closing, gap, closing * closing - square(u) * gap)
 
 
 def _sight_in(box, b, u, touching2, now):
-    """The `Sight` of balls that may grow."""
+    """Return the `Sight` of balls that may grow."""
     return sight(b, u, touching2) if box.growth is None else box.growth.sight(b, u, touching2, now)
 
 
 @outlined
 def _fall_time(b, u, pull, touching2):
-    """How long a ball that is b away falls, with the velocity u, before it touches another one at rest."""
+    """The time in which a ball, at b with the velocity u, falls until it touches a ball at rest."""
     solid, time = ball(ZERO, math.sqrt(touching2)), 0.0
     for _part in range(_PARTS):
         free, found = solid.falling_hit(b, u, pull)
@@ -169,11 +169,11 @@ def _fall_time(b, u, pull, touching2):
 
 
 def _touch_time(box, flock, pair, b, u, now):
-    """How long a pair flies before it touches, the second b away from the first and with u relative to it."""
+    """The time until a pair touches; the second ball is at b from the first, with the relative velocity u."""
     i, j = pair
     touching2 = box.kinds.touching2(i, j)
     if flock.holds is not None and box.pull is not None and flock.is_held(i, now) != flock.is_held(j, now):
-        # One falls, the other one is a solid ball at rest.
+        # One ball falls, and the other one is an obstacle at rest.
         pull = as_vector(box.pull)
         return _fall_time(b, u, either(flock.is_held(i, now), pull, -1.0 * pull), touching2)
     seen = _sight_in(box, b, u, touching2, now)
@@ -182,7 +182,7 @@ def _touch_time(box, flock, pair, b, u, now):
 
 @outlined
 def _meeting_of_any(box, flock, pair, way, u, now):
-    """When a ball meets any image of another one, where these are few and far from one another."""
+    """The time until a ball meets any image of another ball, where cells are few."""
     soonest, grid = math.inf, box.grid
     for kx in range(3):
         for ky in range(3):
@@ -198,9 +198,9 @@ def _meeting_of_any(box, flock, pair, way, u, now):
 
 @outlined
 def _soonest(box, flock, i, now, near, count, known):
-    """The soonest collision of ball i: that which is `known`, or one with the first `count` balls `near` it.
+    """Return the soonest collision of ball i: the `known` one, or one with the first `count` balls in `near`.
 
-    First come those that fly to one another, without a branch, then the roots of these few.
+    A first loop, without a branch, selects the few balls that will touch it; a second one computes the roots of these.
     """
     grid, pull, found = box.grid, box.pull, 0
     r, v = flock.at(pull, i, now)
@@ -225,7 +225,7 @@ def _soonest(box, flock, i, now, near, count, known):
 
 @outlined
 def _soonest_one_by_one(box, flock, i, now, near, count, known):
-    """`_soonest` where a ball may meet several images of another one, or falls beside those that walls hold."""
+    """Return the result of `_soonest` where a ball may meet several images of another one, or fall onto held balls."""
     r, v = flock.at(box.pull, i, now)
     first, mate = known
     for k in range(count):
@@ -248,10 +248,10 @@ def _looked_at(box, flock, i, now, near, count, known):
 
 
 def _around(box, flock, i, now, face, known):
-    """The `NextCollision` of ball i with all balls in the cells around its own, or only in those beyond a face.
+    """Return the `NextCollision` of ball i with the balls in the cells around its own, or only beyond a face.
 
-    First come those that are the first ones of their cells, then those after them in the order in which they were
-    found: so the processor has no branch to predict from how many balls are in a cell.
+    The first balls of all cells come first, then the balls linked to them in the order found: so the processor has no
+    branch to predict that depends on the number of balls in a cell.
     """
     grid, found, done = box.grid, 0, 0
     near = unwritten(_MOST, np.int32)
@@ -268,7 +268,7 @@ def _around(box, flock, i, now, face, known):
     while done < found:
         found += _found(box, flock, flock.after(near[index(done)]), near, found)
         done += 1
-        # Of each chain one ball may still be to come, and `_found` writes one more.
+        # Each chain may add one more ball, and `_found` writes one more entry.
         if done == _MOST - _CELLS - 1:
             known = _looked_at(box, flock, i, now, near, done, known)
             found -= done
@@ -279,7 +279,7 @@ def _around(box, flock, i, now, face, known):
 
 
 def _found(box, flock, j, near, count):
-    """Write a ball behind the first `count`, and ask for its flight: 1, or 0 for `NO_PARTNER`."""
+    """Write a ball behind the first `count`, and fetch its flight; return 1, or 0 for `NO_PARTNER`."""
     near[index(count)] = j
     fetch(flock.flight, FLOATS * j)
     box.kinds.ask(j)
@@ -300,7 +300,7 @@ def find_partner(box, flock, i, now):
 
 @outlined
 def look_ahead(box, flock, i, now):
-    """Look whether a ball that has come into a cell collides sooner with those that are near now: whether it does."""
+    """Look for a sooner collision of a ball that has come into a cell; return whether the ball has one."""
     row = FLOATS * i + MEETS
     if box.grid.few is None:
         before = NextCollision(flock.event[index(row)], flock.tag[index(WHOLES * i + PARTNER)])
@@ -314,7 +314,7 @@ def look_ahead(box, flock, i, now):
 
 
 def tell_partner(flock, i):
-    """Give the collision of a ball to its partner too, if it is its soonest too. Return the partner or `NO_PARTNER`."""
+    """Store the collision of a ball for its partner if it is the partner's soonest; return the partner, or none."""
     mate, time = flock.tag[index(WHOLES * i + PARTNER)], flock.event[index(FLOATS * i + MEETS)]
     partner = NO_PARTNER
     if mate >= 0 and time < flock.event[index(FLOATS * mate + MEETS)]:
@@ -326,13 +326,13 @@ def tell_partner(flock, i):
 
 
 def forget_wall(flock, i):
-    """The next wall of a ball is not known any more."""
+    """Forget the next wall of a ball."""
     flock.event[index(FLOATS * i + DUE)] = math.inf
     flock.aim_at(i, UNKNOWN)
 
 
 def _given_hit(box, flock, i, now):
-    """The next `Hit` on a wall without a mass, if the cell is near one."""
+    """Return the next `Hit` of a ball on a wall without a mass, if its cell is near one."""
     time, wall = math.inf, UNKNOWN
     # Without walls `next_hit` is not compiled.
     if len(box.walls.each) > 0 and box.grid.near[index(box.grid.number(i, flock))]:
@@ -342,9 +342,9 @@ def _given_hit(box, flock, i, now):
 
 @outlined
 def find_wall(box, flock, i, now):
-    """Find when a ball meets a wall, if its cell is near one and that is not known."""
+    """Find when a ball meets a wall, if its cell is near a wall and its next wall is not known."""
     if box.heavy is not None:
-        # A lease ends for all balls, also for those that are not there, or held.
+        # When a lease ends, this is called for all balls, also for held balls and balls outside the scene.
         if flock.wall(i) <= OUT:
             return
         meet_heavy(box, flock, i, now, _given_hit(box, flock, i, now))

@@ -1,8 +1,8 @@
-"""The queue of events: a heap of four children a node; nodes hold the times, so that few balls are looked at.
+"""The queue of events: a heap with four children a node. Nodes hold the times, so that few balls are read.
 
-The order is that of the times; of equal ones that of the smaller ball of a collision, then of the other one (none at a
-wall), so that it does not depend on what was done to the heap before. Nodes are numbered from 3 on, so that children
-are in one line of the cache; behind the last there are some that never come.
+Events are in the order of their times. Events at equal times are in the order of the smaller ball, then of the other
+ball (none at a wall), so that the order does not depend on the history of the heap. Nodes are numbered from 3 on, so
+that children are in one line of the cache. Behind the last node are spare nodes with infinite times.
 """
 
 import math
@@ -11,14 +11,14 @@ from ...kernel.arrays import fetch, index
 from ...kernel.jit import outlined, select
 from .rows import FLOATS, MEETS, NO_PARTNER, PARTNER, WHOLES
 
-# The first node, of which the children are those from 4 (node - 2) to 4 (node - 2) + 3.
+# The first node, and the number of spare nodes. The children of a node are 4 (node - 2) to 4 (node - 2) + 3.
 FIRST, SPARE = 3, 8
 _CHILDREN = 4
 
 
 @outlined
 def _wins(flock, item, other, key):
-    """Whether the event of one ball goes before that of another one at the same time."""
+    """Whether the event of a ball comes before the event of another ball at the same time."""
     low, high = _pair(flock, item, key)
     least, most = _pair(flock, other, key)
     alike = (low == least) & (high == most)
@@ -45,7 +45,7 @@ def _set(flock, node, item, key):
 
 @outlined
 def _first_of_equals(flock, first, soonest):
-    """The child with this time and the event that is first, of those from `first` on."""
+    """The child with the first event among the children, from `first` on, with the time `soonest`."""
     least = first
     for child in range(first, first + _CHILDREN):
         if flock.key[index(child)] == soonest:
@@ -56,11 +56,11 @@ def _first_of_equals(flock, first, soonest):
 
 
 def _sink(flock, node, item, key):
-    """Put a ball at this node, or below it."""
+    """Put a ball at a node, or below it."""
     last = flock.number() + FIRST
     first = _CHILDREN * (node - 2)
     while first < last:
-        # The children of all of these: the next ones are among them.
+        # Fetch the children of all children: the next ones to be read are among them.
         below = _CHILDREN * (first - 2)
         fetch(flock.key, below)
         fetch(flock.key, below + 8)
@@ -85,7 +85,7 @@ def _sink(flock, node, item, key):
 
 
 def _rise(flock, node, item, key):
-    """The node, at or above this one, where a ball is to be: those that it passes are moved down."""
+    """Return the node, at or above a node, where a ball belongs; move the balls that it passes down."""
     while node > FIRST:
         above = (node >> 2) + 2
         other, later = flock.item[index(above)], flock.key[index(above)]
@@ -108,7 +108,7 @@ def requeue(flock, item):
 
 
 def build(flock):
-    """Order the queue by what is next for each ball."""
+    """Order the queue by the next event of each ball."""
     last = flock.number() + FIRST
     for node in range(FIRST, last):
         flock.key[index(node)] = flock.next_of(flock.item[index(node)])

@@ -1,7 +1,7 @@
-"""Balls that come to rest: their impacts are slow, and ever more of them come in the time of a fall.
+"""Balls that come to rest: their impacts are slow, and become ever more frequent.
 
-Hard spheres that lie on one another or on a wall collide without end. Impacts are counted, not timed, so that a run
-finds the same on any machine, with any number of threads, and after it was resumed.
+Hard spheres that lie on one another or on a wall collide without end. The test counts impacts and no processor time, so
+that its result is the same on any machine, with any number of threads, and in a resumed run.
 """
 
 import logging
@@ -15,27 +15,28 @@ from ...kernel.record import Record
 from .clock import IMPACTS, RESTED, SINCE, SLOW, moment_of
 
 _LOG = logging.getLogger("swarm")
-# Balls rest that have more impacts than this in the time in which one falls its radius R, nearly all of them slow: with
-# a part of the speed of that fall at most. Balls of that speed have so many where gaps are less than R/500: in no gas.
+# Balls rest if each has more than `LEAST_RATE` impacts in the time in which a ball falls its radius R, and the part
+# `_SHARE` of them is slow, with at most the part `_PART` of the speed of this fall. Balls of this speed have as many
+# impacts only where gaps are less than R/500, which they are in no gas.
 LEAST_RATE, _SHARE, _PART = 100.0, 0.9, 0.1
-# So many impacts a ball are looked at in a row; of few balls so many in all, since one that crosses a corner has some.
+# The impacts a ball between two tests, and the least number of all balls, as a ball that crosses a corner has several.
 _COUNTED, _FEWEST = 32, 256
-# The contact duration that is proposed, as a part of the time of a fall: a heap of 200 balls then takes as many impacts
-# in a second as it does while it falls.
+# The proposed contact duration, as a part of the time of a fall: a heap of 200 balls then has as many impacts a second
+# as while it falls.
 _LONGER = 0.05
 
 
 class Repose(Record):
-    """What tells that balls rest. A fall is that of the smallest ball, from rest by its radius."""
+    """The test of whether balls rest. A fall is that of the smallest ball, from rest by its radius."""
 
-    fall: float  # its time [s]
+    fall: float  # the time of a fall [s]
     slow2: float  # the square of the change of the normal velocity below which an impact is slow [m^2/s^2]
-    counted: float  # impacts from one look to the next
-    within: float  # the time in which so many come where balls rest [s]
+    counted: float  # the impacts between two tests
+    within: float  # the time in which as many impacts happen where balls rest [s]
 
     @outlined
     def count(self, clock: Any, change2: Any, now: Any) -> None:
-        """Count an impact that changes the normal velocity by this square, and look whether balls rest."""
+        """Count an impact with the squared change `change2` of the normal velocity, and test whether balls rest."""
         clock[IMPACTS] += 1.0
         clock[SLOW] += change2 < self.slow2
         if clock[IMPACTS] >= self.counted:
@@ -47,14 +48,14 @@ class Repose(Record):
 
 
 def repose_of(pull: float, radius: Any) -> Repose:
-    """Of balls with these radii [m] that fall with this acceleration [m/s^2]."""
+    """Return the `Repose` of balls with these radii [m] that fall with the acceleration `pull` [m/s^2]."""
     n, counted = len(radius), float(max(_COUNTED * len(radius), _FEWEST))
     fall = math.sqrt(2.0 * float(np.min(radius)) / pull)
     return Repose(fall, (_PART * pull * fall) ** 2, counted, counted / (n * LEAST_RATE) * fall)
 
 
 def warn_of_rest(box: Any, clock: Any) -> bool:
-    """Warn where balls of a run rest: whether they do."""
+    """Warn if balls of a run rest; return whether they do."""
     if box.repose is None or clock[RESTED] == 0.0:
         return False
     fall = box.repose.fall

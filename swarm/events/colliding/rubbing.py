@@ -1,9 +1,9 @@
 """Coulomb's friction in the impacts of balls that turn.
 
-n is the unit normal, and g the slip: the velocity across n with which the surfaces pass each other at the point of
-contact. An impact has an impulse against g of mu times the normal impulse, and at most of what stops the slip. That is
-m g/(1 + 1/q) with q = I/(m R^2) = 2/5, so 2/7 of m g, where m is the reduced mass of two balls, or the mass of a ball
-at a wall. It turns both balls the same way, so that linear and angular momentum are conserved.
+n is the unit normal, and g the slip: the relative velocity across n of the surfaces at the point of contact. The
+impulse of friction is against g. Its size is mu times the normal impulse, but at most the impulse that stops the slip,
+m g/(1 + 1/q) with q = I/(m R^2) = 2/5, so 2/7 of m g. Here m is the reduced mass of two balls, or the mass of a ball at
+a wall. The impulse turns both balls the same way, so that linear and angular momentum are conserved.
 
 Source: O. R. Walton, in M. C. Roco (ed.), Particulate Two-Phase Flow (1993), chapter 25, without restitution of the
 slip.
@@ -19,7 +19,7 @@ from ...kernel.jit import Array, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, column, cross, dot, either, put, square
 
-# Of the slip, what the velocity takes where it stops, and R times the spin: they add up to 1.
+# The parts of a stopped slip that the velocity takes, and R times the spin: they add up to 1.
 _STOP, _TURN = INERTIA / (1.0 + INERTIA), 1.0 / (1.0 + INERTIA)
 
 
@@ -27,14 +27,14 @@ class BallSpins(Record):
     """The spins of balls, and the friction of their collisions."""
 
     spin: Array  # (3, N) [rad/s]
-    friction: Any  # of two balls; None: their collisions are smooth
+    friction: Any  # the coefficient of friction of two balls; None for smooth collisions
 
     def at(self, i):
         """The spin of a ball."""
         return column(self.spin, 0, index(i))
 
     def add(self, i, change):
-        """Change it, and return twice the energy per mass and R^2 that this takes from it."""
+        """Change the spin of a ball; return twice the energy per mass and R^2 that it loses."""
         before = self.at(i)
         after = before + change
         put(self.spin, 0, index(i), after)
@@ -46,20 +46,20 @@ def _across(a, n):
 
 
 def _share(friction, impulse, slip):
-    """The part of the slip that friction stops, of a normal impulse per mass."""
+    """The part of the slip that friction stops, from the normal impulse per mass."""
     speed, most = math.sqrt(square(slip)), friction * impulse
     return select(most >= _STOP * speed, 1.0, most / (_STOP * select(speed > 0.0, speed, 1.0)))
 
 
 @outlined
 def rub_pair(kinds, turning, pair, n, u, impulse):
-    """The change of the relative velocity u of two balls by friction, and the energy that it takes [J].
+    """Turn two balls by friction; return the change of their relative velocity u, and the energy lost [J].
 
-    n is the unit normal from the first to the second of the `pair`; `impulse` is the normal one per reduced mass.
+    n is the unit normal from the first to the second of the `pair`; `impulse` is the normal impulse per reduced mass.
     """
     i, j = pair
     one, other = kinds.radius_of(i), kinds.radius_of(j)
-    # A ball that is held does not turn; its spin is that with which it leaves.
+    # A held ball does not turn: its stored spin is that with which it leaves.
     held, holds = kinds.is_held(i), kinds.is_held(j)
     spin, spins = either(held, ZERO, turning.at(i)), either(holds, ZERO, turning.at(j))
     slip = _across(u, n) - cross(one * spin + other * spins, n)
@@ -75,7 +75,7 @@ def rub_pair(kinds, turning, pair, n, u, impulse):
 
 @outlined
 def rub_wall(laws, walls, wall, turning, ball, bounce):
-    """The `Bounce` of a ball, given as its number, its radius and its place, with the friction of the wall."""
+    """Turn a ball by the friction of a wall; return the `Bounce`. `ball` is its number, its radius and its place."""
     i, radius, r = ball
     n = walls.unit_normal(wall, r)
     u = wall_velocity(laws.moving, walls, wall, r + radius * n)

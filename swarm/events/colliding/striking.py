@@ -1,4 +1,4 @@
-"""The impact of a ball on a wall with a mass, after which the balls near such walls look for their next wall."""
+"""The impact of a ball on a wall with a mass, after which the balls near walls with a mass look for their next wall."""
 
 import math
 
@@ -24,7 +24,7 @@ from .window import END
 
 @outlined
 def strike_heavy(box, flock, books, clock, i, now):
-    """The impact of a ball on the wall with a mass that it meets now: a status."""
+    """Carry out the impact of a ball on the wall with a mass that it meets now; return a status."""
     heavy, m = box.heavy, box.kinds.mass_of(i)
     wall = flock.wall(i) - first_number(box)
     follow(box, flock, books, clock, i, now)
@@ -71,7 +71,7 @@ def strike_heavy(box, flock, books, clock, i, now):
 
 
 def _blow(box, flock, wall, flight, ball):
-    """The `WallImpact` of a ball, given as its number and how many impacts it has had."""
+    """Return the `WallImpact` of a ball; `ball` is its number, and the number of its impacts so far."""
     (i, impacts), heavy = ball, box.heavy
     radius, random = box.kinds.radius_of(i), None
     walls = heavy.grown(radius)
@@ -97,14 +97,14 @@ def _book(box, books, i, blow):
 
 @outlined
 def _look_again(box, flock, now):
-    """Find the next wall of each ball that is near, after a strike."""
+    """Find the next wall of each near ball after a strike."""
     heavy = box.heavy
     count = int(heavy.counts[LISTED])
     heavy.counts[LISTED] = 0.0
     for k in range(count):
         item = heavy.close[index(k)]
         heavy.listed[index(item)] = False
-        # Those that are near again are listed before the ones that come.
+        # A ball that is near again is listed at a place that has been read.
         if heavy.near[index(item)]:
             find_wall(box, flock, item, now)
             requeue(flock, item)
@@ -112,13 +112,13 @@ def _look_again(box, flock, now):
 
 @outlined
 def renew_leases(box, flock, clock, now):
-    """New leases of the walls from now on; all balls look for their next wall."""
+    """Renew the leases of the walls; all balls look for their next wall."""
     heavy, freedoms = box.heavy, box.heavy.freedoms
     each = (clock[EVENTS] - heavy.counts[SINCE]) / flock.number()
     for freedom in heavy.ways:
         k = index(freedom.row)
         width = freedoms.width[k]
-        # A wider one lasts longer, unless it ends where the motion is not known any more.
+        # A wider lease lasts longer, unless it ends where the Taylor polynomial of the motion does.
         ends = freedoms.until[k] <= now
         short = freedom.away(freedoms) >= width or (
             ends and freedom.keeps(freedoms, 2.0 * width) > freedom.keeps(freedoms, width)
@@ -144,7 +144,7 @@ def renew_ended(box, flock, clock, end):
 
 
 def shift_leases(freedoms, shift):
-    """Count the times of the walls from a later one on."""
+    """Shift the zero of the times of the walls by `shift` [s]."""
     for k in range(freedoms.time.size):
         freedoms.time[index(k)] -= shift
         freedoms.until[index(k)] -= shift

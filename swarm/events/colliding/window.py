@@ -1,7 +1,7 @@
-"""Walls that move, come and go: what is known of them until the end of a window, and when balls meet them until then.
+"""Walls that move or become absent: their description in a window, and the hits of balls on them in it.
 
-A window is a span of time in which the walls have one description, whatever the frames are. From one to the next all
-balls look for their next wall again.
+A window is a span of time, independent of frames, in which the walls have one description. At the start of each window,
+all balls look for their next wall again.
 """
 
 import math
@@ -22,20 +22,21 @@ from ..reacting.queue import SceneWalls
 from .clock import EPOCHS, LENGTH
 from .rows import FLOATS, LEAVES
 
-# Of a window: its end and its length [s since the epoch], how many instants there were before its end, that end [s].
+# Entries of a window: its end [s of the epoch] and its length [s], the number of instants up to its end, its end [s].
 END, SPAN, PASSED, MOMENT, WINDOW = 0, 1, 2, 3, 4
-# No wall is known yet; the ball is no more among the walls; from this number on downwards a wall holds it.
+# These stand in place of the number of a wall: no wall is known yet; the ball has left the walls; a wall holds the
+# ball, from `HELD` on downwards.
 UNKNOWN, OUT, HELD = -2.0, -3.0, -4.0
 
 
 def walls_at(box, i, now):
-    """The walls that the centre of a ball meets, at a time."""
+    """The walls that the centre of a ball meets at a time."""
     walls = box.walls.grown(box.kinds.radius_of(i))
     return walls if box.window is None else walls.at(box.window[END] - now)
 
 
 def next_hit(box, flock, i, now):
-    """When a ball meets a wall next; of walls that move only before it leaves its cell and before the window ends."""
+    """Return the next `Hit` of a ball on a wall; if walls move, only before the ends of its cell and of the window."""
     r, v = flock.at(box.pull, i, now)
     if box.window is None:
         return flights.first_hit(box.walls.grown(box.kinds.radius_of(i)), box.pull, r, v)
@@ -48,7 +49,7 @@ def next_hit(box, flock, i, now):
 
 @outlined
 def _hit_before(walls, gravity, r, v, remaining, longest):
-    """The first `Hit` of a flight before a time, with so much of the window left."""
+    """Return the first `Hit` of a flight within `longest` [s], with `remaining` [s] of the window left."""
     found = safe.closed_hit(walls.at(remaining), gravity, r, v)
     if walls.accelerate:
         soonest = min(found.time, longest)
@@ -67,7 +68,7 @@ def middle_of(box):
 
 
 def swept(wall, r, half):
-    """A bound of how much nearer to a place a wall may come within a time."""
+    """A bound of the way of a wall towards a place within a time `half` [s]."""
     way: Any = 0.0
     if half is not None and isinstance(wall, Posed):
         drive = wall.drive
@@ -79,10 +80,10 @@ def swept(wall, r, half):
 
 
 class Windows:
-    """The windows of a scene with walls that move, come or go: each is an epoch, or a part of one between two instants.
+    """The windows of a scene with walls that move or become absent: epochs, or parts of epochs between two instants.
 
     Attributes:
-        numbers: of the window, as kernels take them.
+        numbers: the array of the window, as kernels take it.
     """
 
     def __init__(self, compiled: CompiledScene, clock: Floats) -> None:
@@ -100,23 +101,23 @@ class Windows:
         return self._instants[passed - 1] if passed and self._instants[passed - 1] == self.numbers[MOMENT] else None
 
     def begin(self, now: float) -> None:
-        """The window that begins at a time of the epoch [s]."""
+        """Begin a window at a time of the epoch [s]."""
         epochs, length = self._clock[EPOCHS], self._clock[LENGTH]
         end, moment, passed = length, (epochs + 1.0) * length, int(self.numbers[PASSED])
         if passed < len(self._instants) and self._instants[passed] <= moment:
             moment = self._instants[passed]
-            # By round-off none is without length.
+            # The instant may be after the end of the epoch by round-off.
             end = min(moment - epochs * length, length)
             passed += 1
         self.numbers[:] = end, end - now, passed, moment
 
     def scenery(self) -> SceneWalls:
-        """The walls in this window, those that have no mass and those that have one."""
+        """Return the walls in this window, without and with a mass."""
         return scenery_of(self._compiled, float(self.numbers[MOMENT]))
 
 
 def windows_of(compiled: CompiledScene, clock: Floats) -> Windows | None:
-    """The windows of a scene, None where its walls are always the same."""
+    """Return the windows of a scene, None if its walls never change."""
     scene = compiled.scene
     moves = scene.moves()
     if scene.reacts():

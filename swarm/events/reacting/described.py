@@ -1,4 +1,4 @@
-"""A scene with walls that react as kernels take it, from its description."""
+"""A scene with reacting walls as kernels take it, made from its description."""
 
 import math
 from typing import Any
@@ -22,7 +22,7 @@ from .strikes import Reacting
 
 
 def scenery_of(compiled: CompiledScene, moment: float) -> SceneWalls:
-    """The walls of a scene in the frame that ends at a moment [s]."""
+    """Return the walls of a scene in the frame that ends at a moment [s]."""
     scene = compiled.scene
     given = compiled.of_no_mass if scene.reacts() else compiled
     reacts, numbering = np.array([surface.reacts() for surface in scene.surfaces], bool), compiled.numbering
@@ -40,7 +40,7 @@ def scenery_of(compiled: CompiledScene, moment: float) -> SceneWalls:
 
 
 def _reacting(compiled: CompiledScene, moment: float) -> tuple[Reacting, ...]:
-    """The walls that react, in the order of the scene's walls; rows of freedoms are in that of its surfaces."""
+    """The reacting walls in the order of the walls of the scene; rows of freedoms are in the order of its surfaces."""
     scene, pieces, made = compiled.scene, compiled.pieces, list[Reacting]()
     heavy = [i for i, surface in enumerate(scene.surfaces) if surface.reacts()]
     numbers, rows = compiled.numbering.pieces_of_walls, compiled.numbering.rows_of_walls
@@ -61,14 +61,14 @@ def _reacting(compiled: CompiledScene, moment: float) -> tuple[Reacting, ...]:
 
 
 def _loosened(wall: Any, scene: Scene) -> Any:
-    """A wall, or a field that may be moved as far as the scene reaches, which places have the round-off of."""
+    """A wall, or a field with bounds loose enough for the round-off of places anywhere in the scene."""
     return wall.loosened(scene.extent()) if isinstance(wall, Members) else wall
 
 
 def _laws_of(surface: Surface, scene: Scene) -> Laws | None:
-    """The laws of a surface that reacts; None where they are a restitution at most."""
+    """Return the laws of a reacting surface; None if they are a restitution at most."""
     if not (surface.laws or surface.friction > 0.0 or surface.temperature is not None):
-        # Each frame asks this.
+        # Every frame calls this.
         return None
     laws = Scene([surface], plane=scene.plane).compiled(None, REACTING).laws or NONE
     return laws._replace(moving=None) if laws.send_off or laws.friction is not None else None
@@ -89,13 +89,13 @@ def _freedom(surface: Surface, row: int, gravity: tuple[float, float, float]) ->
 
 
 def _turning(surface: Surface, row: int, gravity: Floats) -> Hinged | Pendulum:
-    """The freedom of a wall on an axis: its weight is at its centre."""
+    """Return the freedom of a wall on an axis; its weight acts at its centre."""
     motion, lightness = surface.motion, 1.0 / (surface.inertia or 1.0)
     k, pivot = unit_axis(motion), np.array(motion.center)
     if surface.mass is not None:
         arm = np.array(surface.center) - pivot  # type: ignore[attr-defined]
         arm = arm - (arm * k).sum() * k
-        # The torque k.(A l x M G) = M (k.(l x G) cos theta - l.G sin theta), over the inertia
+        # The torque k.(A l x M G) = M (k.(l x G) cos theta - l.G sin theta), divided by the inertia.
         sine, cosine = ((k * np.cross(arm, gravity)).sum(), (arm * gravity).sum())
         stiffness = surface.mass * lightness * math.hypot(sine, cosine)
         if stiffness > 0.0:
@@ -108,7 +108,7 @@ def _vector(values: Floats) -> Vec:
 
 
 def freedoms_of(compiled: CompiledScene, velocity: Floats) -> Freedoms:
-    """The walls that react at the start, with leases for particles of these velocities (3, N) [m/s]."""
+    """Return the motion of the reacting walls at the start, with leases for particles of velocities (3, N) [m/s]."""
     width = WIDTH * math.sqrt(float((velocity**2).sum(axis=0).mean())) or WIDTH
     scene = compiled.scene
     surfaces = [surface for surface in scene.surfaces if surface.reacts()]
@@ -131,19 +131,19 @@ def freedoms_of(compiled: CompiledScene, velocity: Floats) -> Freedoms:
 
 
 def bring_walls(scenery: SceneWalls, freedoms: Freedoms, t: float) -> None:
-    """Bring the walls to a time, from which their motions are counted then."""
+    """Move the walls to a time, from which their motions are then counted."""
     for wall in scenery.reacting:
         wall.freedom.push(freedoms, t, ZERO, ZERO)
     freedoms.time.fill(0.0)
 
 
 def walls_now(compiled: CompiledScene, scenery: SceneWalls, freedoms: Freedoms) -> Walls:
-    """All walls of a scene, in its order, at the end of the frame of `scenery`."""
+    """Return all walls of a scene, in its order, at the end of the frame of `scenery`."""
     still = scenery.given.at(0.0)
     given = iter(still.each)
     posed = (wall.freedom.posed(wall.body, freedoms, 0.0) for wall in scenery.reacting)
     reacting = (Field(wall) if isinstance(wall.body, Members) else wall for wall in posed)
     owned = [compiled.scene.surfaces[i] for i in compiled.numbering.surfaces_of_rows]
-    # Those of unions, which have no mass, are last.
+    # The walls of unions, which have no mass, are last.
     every = tuple(next(reacting if surface.reacts() else given) for surface in owned)
     return Walls(every, still.unions, still.slack, still.inset)

@@ -1,7 +1,7 @@
-"""The ways in which a wall that reacts may move: freely without turning, along a guide, on a spring, about an axis.
+"""The degrees of freedom of reacting walls: freely without turning, along a guide, on a spring, about an axis.
 
-Between two impacts its motion is known. A lease bounds what impacts do to it: until the wall leaves the lease, its
-velocity stays within a width of a middle one, so that bounds of the times of far particles hold.
+Between two impacts the motion of a wall is known. A lease bounds the effect of impacts on it: until the wall leaves the
+lease, its velocity stays within a width of a middle velocity, so that bounds of the times of far particles hold.
 """
 
 import math
@@ -20,30 +20,30 @@ from ...surfaces.time_of_impact import flights, safe
 from ...surfaces.time_of_impact.rising import flight_of
 from ...surfaces.walls import Field, Walls
 
-# The width of the first leases, relative to the particles' speed. Leases that end before the second number of events a
-# particle are too narrow; those that last for more than the third are too wide.
+# The width of the first leases, relative to the speed of the particles. Leases that end before `TOO_SHORT` events a
+# particle are too narrow; leases that last for more than `TOO_LONG` are too wide.
 WIDTH, TOO_SHORT, TOO_LONG = 0.1, 4.0, 32.0
 
 
 class Freedoms(NamedTuple):
-    """The motion of the walls that react: arrays of one column a wall."""
+    """The motion of the reacting walls: arrays with one column a wall."""
 
     shift: Array  # (3, K) the displacement at `time` [m]
     velocity: Array  # (3, K) [m/s]
-    rest: Array  # (3, K) what round-off took of it: a heavy wall is struck a million times by what is light
+    rest: Array  # (3, K) the round-off lost from the velocity, as light particles strike a heavy wall a million times
     angle: Array  # (K,) [rad]
     rate: Array  # (K,) [rad/s]
     rate_rest: Array  # (K,)
-    series: Array  # (.., K) of pendulums, the Taylor coefficients of the angle from that time on
+    series: Array  # (.., K) the Taylor coefficients of the angles of pendulums, about `time`
     time: Array  # (K,) since the start of the frame [s]
-    middle: Array  # (3, K) of the velocities of its lease
-    turning: Array  # (K,) of the rates of its lease
-    width: Array  # (K,) by how much both may differ from that, [m/s] or [rad/s]
-    until: Array  # (K,) when it may leave the lease by what pulls it [s]
+    middle: Array  # (3, K) the middle velocity of the lease [m/s]
+    turning: Array  # (K,) the middle rate of the lease [rad/s]
+    width: Array  # (K,) the largest deviation from it within the lease, [m/s] or [rad/s]
+    until: Array  # (K,) the time until which forces alone surely leave the wall in its lease [s]
 
 
 class ParticleFlight(NamedTuple):
-    """A particle at a time of the frame, and how far ahead of it matters [s]."""
+    """A particle at a time of the frame, and the longest time ahead that matters [s]."""
 
     r: Vec
     v: Vec
@@ -55,15 +55,15 @@ class ParticleFlight(NamedTuple):
 class Lease(Record):
     """A particle in the frame that moves with the middle velocity of a lease: the wall is nearly at rest there.
 
-    There the wall stays within the width times the time of where it is: for a plane and a ball the first time at which
-    a flight is as near as that is the root of a parabola.
+    There the wall stays within the width times the time of its place. For a plane and a ball, the first time at which
+    a flight is as near to this place is the root of a parabola.
     """
 
     r: Vec
     v: Vec
     a: Vec
     width: float
-    axis: Any  # along which the wall may leave it, or None
+    axis: Any  # the axis along which the wall may deviate, or None for all directions
     longest: float
 
     def width_along(self, n):
@@ -72,7 +72,7 @@ class Lease(Record):
 
 
 class Falling(Posed):
-    """A wall at one instant of a free motion with a constant acceleration, or none."""
+    """A wall at an instant of a free motion with a constant acceleration, which may be 0."""
 
     def first_hit(self, r, v):
         return self.body.first_hit(r - self.pose.shift, v - self.pose.velocity)
@@ -90,18 +90,18 @@ _AT_REST = Drive(ZERO, ZERO, (), None, None, None, ZERO, 0.0, 0.0, 0.0, math.inf
 
 
 class Spread(Record):
-    """Velocities of a particle relative to a wall, as those of the same particle at a wall that nothing moves.
+    """A map of velocities relative to a reacting wall to velocities of the same particle at a fixed wall.
 
-    With A = 1/m + (what a unit impulse gives the wall) and A = S S/m the energy of the velocity w = S y relative to the
-    wall, w.A^-1 w/2, is m y.y/2. In y an elastic impact is the reflection about S n, and a law of a wall at rest does
-    to a wall with a mass what it does to a fixed one: what it keeps of the energy is kept with the wall's, and a gas in
-    equilibrium with a wall of its temperature stays so.
+    Let A = 1/m + (the velocity that a unit impulse gives the wall), and A = S S/m. The energy of the relative velocity
+    w = S y, w.A^-1 w/2, is m y.y/2. In y an elastic impact is the reflection about S n, and a law for a fixed wall acts
+    in y. A law that conserves energy then conserves it together with that of the wall, and a gas in equilibrium with
+    a wall of its temperature stays in equilibrium.
     """
 
-    way: Any  # along which S differs from 1, or None
-    factor: float  # of S where there is no way
-    more: float  # of w along the way, times it, in S
-    less: float  # and in 1/S
+    way: Any  # the direction along which S differs from 1, or None
+    factor: float  # S, if there is no way
+    more: float  # S = 1 + more way way^T
+    less: float  # S^-1 = 1 + less way way^T
 
     def out(self, y):
         """S y."""
@@ -113,14 +113,14 @@ class Spread(Record):
 
 
 class Freedom(Record):
-    """A way to move of a wall, by its `row` among the `walls` and its `lightness`, 1/M or 1/I; times are of a frame."""
+    """A degree of freedom of a wall: its `row` in `walls`, its `lightness`, 1/M or 1/I; times are those of a frame."""
 
     def pose(self, walls, t):
-        """Its `PoseDerivatives` at a time."""
+        """The `PoseDerivatives` of the wall at a time."""
         raise NotImplementedError
 
     def drive(self, walls, t):
-        """Its motion from a time on as that of a wall with a given motion; its frame ends then."""
+        """The motion from a time on, as the `Drive` of a wall with a prescribed motion in a frame that ends then."""
         raise NotImplementedError
 
     def posed(self, body, walls, t):
@@ -130,7 +130,7 @@ class Freedom(Record):
         return Posed(body, here, here, drive, 0.0, 0.0)
 
     def arm(self, r):
-        """From the centre of the rotation to a point."""
+        """The vector from the centre of the rotation to a point."""
         return r
 
     def mobility(self, n, arm):
@@ -138,16 +138,16 @@ class Freedom(Record):
         raise NotImplementedError
 
     def along(self, arm):
-        """The only way in which the end of the arm moves, as fast as the wall by its length; None: any way."""
+        """The velocity of the end of the arm in a unit motion of the wall, the only possible one; None if any is."""
         raise NotImplementedError
 
     def response(self, impulse, arm):
-        """The velocity that an impulse at the end of the arm gives that [m/s]."""
+        """The velocity that an impulse at the end of the arm gives this end [m/s]."""
         b, lightness = self.along(arm), self.lightness
         return lightness * impulse if b is None else (lightness * dot(impulse, b)) * b
 
     def spread(self, mass, arm):
-        """The `Spread` of velocities of a particle of this mass relative to the end of the arm."""
+        """Return the `Spread` of the velocities of a particle of this mass relative to the end of the arm."""
         b, part = self.along(arm), mass * self.lightness
         if b is None:
             return Spread(None, math.sqrt(1.0 + part), 0.0, 0.0)
@@ -167,54 +167,54 @@ class Freedom(Record):
         raise NotImplementedError
 
     def keeps(self, walls, more):
-        """How long its pull leaves the wall in its lease [s], if its velocity may change by `more`."""
+        """How long forces surely leave the wall in its lease [s], if its velocity may change by `more`."""
         raise NotImplementedError
 
     def renew(self, walls, t):
-        """A new lease from a time on, about the velocity that the wall has."""
+        """Begin a new lease at a time, about the velocity of the wall."""
         k = index(self.row)
         self.begin_lease(walls, t)
         walls.until[k] = t + self.keeps(walls, walls.width[k])
 
     def stays(self, walls):
-        """Whether a wall that was just struck is within its lease; stores until when it is."""
+        """Store until when the lease of a wall that was just struck holds; return whether the wall is within it."""
         k, away = index(self.row), self.away(walls)
         walls.until[k] = walls.time[k] + self.keeps(walls, walls.width[k] - away)
         return away < walls.width[k]
 
     def reach(self, body, walls, flight):
-        """A time during which the flight surely does not meet this wall, at most the longest that matters."""
+        """A time in which the flight surely does not meet this wall, at most the longest time that matters."""
         raise NotImplementedError
 
     def hit(self, body, gravity, walls, flight):
-        """The `Hit` of a flight with the wall, number 0, or a wall of a field."""
+        """Return the `Hit` of a flight on the wall, with the number 0, or on a wall of a field."""
         return march(Moving(body, self.drive(walls, flight.time)), flight, flight.longest)
 
 
 def march(wall, flight, longest):
-    """`Freedom.hit` of a wall that is met by safe steps, within so long [s]."""
+    """Return the `Hit` of a flight on a wall within `longest` [s], by safe steps."""
     return safe.march_moving(alone(wall), flight_of(flight.r, flight.v, flight.pull, 0.0), longest)
 
 
 def alone(wall):
-    """The walls of a scene that has only this one, or field."""
+    """Return the walls of a scene with only this wall, or field."""
     return Walls((Field(wall) if isinstance(wall.body, Members) else wall,))
 
 
-# --- Without turning -------------------------------------------------------------------------------------
+# --- Walls that do not turn ------------------------------------------------------------------------------
 
 
 class Shifted(Freedom):
-    """A wall that does not turn, pulled by its weight: in any direction, or along a guide, where it may have a spring.
+    """A wall that does not turn, pulled by its weight: it moves freely, or along a guide, where it may have a spring.
 
-    The spring is relaxed where the wall is given.
+    The spring is relaxed at the given place of the wall.
     """
 
     row: int
     lightness: float
     pull: Vec  # along the axis, if there is one
     axis: Any  # of the guide, or None
-    rate: Any  # of the vibration on the spring [rad/s], or None
+    rate: Any  # the angular frequency of the spring [rad/s], or None
 
     def pose(self, walls, t):
         k = index(self.row)
@@ -232,11 +232,11 @@ class Shifted(Freedom):
         return PoseDerivatives(column(walls.shift, 0, k) + t * (v + (0.5 * t) * pull), v + t * pull, pull, None)
 
     def equilibrium(self):
-        """The displacement at which the spring holds it."""
+        """The displacement of the wall in equilibrium on the spring."""
         return self.pull / (self.rate * self.rate)
 
     def swing(self, shift, velocity):
-        """Its distance from there, and its velocity over the rate."""
+        """Return the distance of a displacement from equilibrium, and the velocity over the rate."""
         return shift - self.equilibrium(), velocity / self.rate
 
     def drive(self, walls, t):
@@ -274,7 +274,7 @@ class Shifted(Freedom):
         walls.time[k] = t
 
     def hardest(self, walls):
-        """A bound of the wall's acceleration between impacts [m/s^2]."""
+        """A bound of the acceleration of the wall between impacts [m/s^2]."""
         if self.rate is None:
             return norm(self.pull)
         k = index(self.row)
@@ -304,7 +304,7 @@ class Shifted(Freedom):
 
 
 def exact_sum(a, b):
-    """a + b and what round-off takes of it (Knuth)."""
+    """Return a + b and its round-off error (Knuth)."""
     found = a + b
     other = found - a
     return found, (a - (found - other)) + (b - other)

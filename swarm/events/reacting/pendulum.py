@@ -1,7 +1,7 @@
 """Walls that turn about an axis: freely, or by their weight, as theta'' = -k sin(theta - rest).
 
 Within a lease the angle of a pendulum is its Taylor polynomial. The radius of convergence is above
-1/(sqrt(k) + |rate|); a lease lasts for so small a part of this that the last term is round-off.
+1/(sqrt(k) + |rate|), and a lease lasts for a part of it so small that the last term is round-off.
 """
 
 import math
@@ -15,7 +15,7 @@ from ...surfaces.in_motion.posed import Posed
 from ...surfaces.time_of_impact.course import rise_time
 from .freedoms import Freedom, exact_sum, march
 
-# Terms of the polynomial, and the part of the radius that it is for.
+# The terms of the polynomial, and the part of the radius of convergence in which it is used.
 TERMS, _PART = 17, 0.1
 
 
@@ -26,7 +26,7 @@ class Turning(Freedom):
         return r - self.center
 
     def lever(self: Any, n, arm):
-        """By how much an impulse along n at the end of the arm turns it."""
+        """The lever of an impulse along n at the end of the arm."""
         return dot(cross(arm, n), self.axis)
 
     def along(self: Any, arm):
@@ -55,7 +55,7 @@ class Turning(Freedom):
 
 
 class Hinged(Turning):
-    """A wall that turns about an axis, on which its centre of mass is."""
+    """A wall that turns about an axis through its centre of mass."""
 
     row: int
     lightness: float
@@ -95,10 +95,10 @@ def rows_about(axis, angle):
 
 
 class Swaying(Record):
-    """A pendulum as flights meet it, from a time on."""
+    """A pendulum as safe steps of flights take it, from a time on."""
 
     body: Any
-    drive: Drive  # what bounds its motion
+    drive: Drive  # the bounds of its motion
     freedom: Any
     walls: Any
     start: float
@@ -110,7 +110,7 @@ class Swaying(Record):
         return self.body.count()
 
     def seen(self, flight, t):
-        """A particle as safe steps to the pendulum see it."""
+        """A particle in the frame of the pendulum, for safe steps."""
         freedom, walls, time = self.freedom, self.walls, self.start + t
         now = freedom.posed(self.body, walls, time)
         euler = freedom.angle(walls, time).acceleration * cross(freedom.axis, freedom.arm(flight.place(t)))
@@ -126,7 +126,7 @@ class Angle(NamedTuple):
 
 
 class Pendulum(Turning):
-    """A wall on an axis, and the stiffness that gravity gives it."""
+    """A wall on an axis, with the stiffness that gravity gives it."""
 
     row: int
     lightness: float  # 1/I
@@ -136,7 +136,7 @@ class Pendulum(Turning):
     rest: float  # the angle at which it hangs [rad]
 
     def expand(self, walls):
-        """The Taylor coefficients of theta, sin(theta - rest) and cos(theta - rest) from where the wall is now."""
+        """Set the Taylor coefficients of theta, sin(theta - rest) and cos(theta - rest) about the present angle."""
         k, series = index(self.row), walls.series
         sines, cosines = TERMS, 2 * TERMS
         series[0, k], series[1, k] = walls.angle[k], walls.rate[k]
@@ -145,7 +145,7 @@ class Pendulum(Turning):
         for n in range(TERMS - 2):
             # (n + 1)(n + 2) theta_n+2 = -k s_n
             series[n + 2, k] = -self.stiffness * series[sines + n, k] / ((n + 1) * (n + 2))
-            # (n + 1) s_n+1 = sum (j + 1) theta_j+1 c_n-j, and the same of the cosine
+            # (n + 1) s_n+1 = sum (j + 1) theta_j+1 c_n-j, and (n + 1) c_n+1 = -sum (j + 1) theta_j+1 s_n-j
             s, c = 0.0, 0.0
             for j in range(n + 1):
                 slope = (j + 1) * series[j + 1, k]
@@ -186,7 +186,7 @@ class Pendulum(Turning):
         super().begin_lease(walls, t)
 
     def keeps(self, walls, more):
-        # As long as the weight leaves the rate in it, and the polynomial is good
+        # The weight changes the rate by at most k a second, and the polynomial is accurate in a part of its radius.
         most, rate = self.stiffness, walls.rate[index(self.row)]
         return min(more / most, _PART / (math.sqrt(most) + abs(rate)))
 
@@ -196,13 +196,13 @@ class Pendulum(Turning):
         return march(self.swaying(body, walls, flight, longest), flight, longest)
 
     def swaying(self, body, walls, flight, longest):
-        """The wall as safe steps of a flight know it, for so long [s]."""
+        """The wall with the bounds that safe steps of a flight need for `longest` [s]."""
         k, stiffness = index(self.row), self.stiffness
         # rate^2/2 - k cos(theta - rest) is constant.
         fastest = math.sqrt(walls.rate[k] * walls.rate[k] + 4.0 * stiffness)
         speed = norm(flight.v) + longest * norm(flight.pull)
         arm = norm(self.arm(flight.r)) + longest * speed
-        # Of A^T x: theta'' x, and theta''' x + 3 theta'' (x' + theta' x)
+        # The derivatives of A^T x are bounded by those of theta'' x, and theta''' x + 3 theta'' (x' + theta' x).
         hard, jerk = stiffness * arm, stiffness * (4.0 * fastest * arm + 3.0 * speed)
         turn, jerks = Turn(ZERO, ZERO, ZERO, self.axis, fastest), Vec(jerk, jerk, jerk)
         bounds = Drive(ZERO, ZERO, (), None, turn, ZERO, self.center, 0.0, hard, jerk, math.inf, 0.0, jerks)

@@ -1,9 +1,9 @@
-"""Impacts in order of time: what is next for each particle waits in a heap, and one thread takes the first of all.
+"""Impacts in order of time: the next event of each particle is in a heap, and one thread takes the earliest one.
 
-A particle that is far from every wall that reacts is looked at again after its reach, or at its next impact on another
-wall. One that is near has the time of its impact, which holds until a wall that reacts is struck: then those that are
-near are looked at again, and all of them only when a wall leaves its lease. So an impact costs some operations of the
-heap, not a prediction for every particle.
+A particle far from every reacting wall is predicted again after its reach, or at its next impact on another wall. A
+near particle has the time of its impact, which is valid until a reacting wall is struck. After a strike the near
+particles are predicted again, and all particles only when a wall leaves its lease. So an impact costs some operations
+of the heap, not a prediction for every particle.
 """
 
 import math
@@ -30,57 +30,57 @@ from ...surfaces.time_of_impact import flights, safe
 from .freedoms import ParticleFlight
 from .strikes import all_stay, exit_at, first_hit, reach_of_all, strike, with_energy
 
-# What is next for a particle besides the impact on a wall that reacts (its number is 0 or more): nothing that was
-# found, so that it is looked at again.
+# This stands for no reacting wall: no impact was found, so that the particle is predicted again.
 NONE = -1.0
-# Of the walls that do not react: it waits at one, or is not born yet.
+# This stands for no other wall: the particle waits at a wall, or is not born yet.
 WAITS = -2.0
-# Of a clock: the time in the frame; of the run, the time before the frame and the strikes of walls that react; how many
-# events were taken since the leases began.
+# Entries of a clock: the time in the frame, the time before the frame, the strikes of reacting walls in the run, and
+# the events since the leases began.
 NOW, BEFORE, STRIKES, TAKEN, CLOCK = 0, 1, 2, 3, 4
-# Impacts of one particle in one frame after which it is given up.
+# The most impacts of one particle in one frame.
 MOST_HITS = 10_000_000
-# Each of those between which no time passes is as many: an inelastic collapse ends sooner, the tip of a wedge does not.
+# An impact in which no time has passed counts as this number of impacts: an inelastic collapse ends sooner, and the tip
+# of a wedge never.
 AT_ONCE = 1000
 
 
 class SceneWalls(NamedTuple):
-    """The walls of a scene: those that do not react, their laws and their numbers in the scene; those that do."""
+    """The walls of a scene: the other walls with their laws and their numbers in the scene, and the reacting walls."""
 
-    given: Any  # None, or the walls
+    given: Any  # the walls that do not react, or None
     laws: Laws
     owners: Array  # (given walls,)
-    rows: Array  # (given walls,) of the books of the scene
+    rows: Array  # (given walls,) their rows in the books of the scene
     reacting: Any
     pull: Any  # gravity, or None
     size: float = 1.0  # of the scene [m]
     source: Any = None  # `RandomSource` where walls send particles off by a law
-    openings: Any = None  # None, or each `Opened` of the walls that do not react
+    openings: Any = None  # None, or each `Opened` of the given walls
 
     def each_laws(self) -> list[Laws]:
-        """The laws of the walls without a mass, and of each that reacts and has some."""
+        """The laws of the given walls, and of each reacting wall with laws."""
         return [self.laws, *(wall.laws for wall in self.reacting if wall.laws is not None)]
 
 
 class Queue(NamedTuple):
-    """The particles between two impacts, and what is next for each: arrays of one column a particle."""
+    """The particles between two impacts, and the next event of each: arrays with one column a particle."""
 
     position: Array  # (3, N) at `time`
     velocity: Array  # (3, N)
     mass: Array  # (N,)
     energy: Array  # (N,) per mass
-    impulse: Array  # (2 walls, N) then the work of walls that move
+    impulse: Array  # (2 walls, N), then the work of moving walls
     dissipated: Array  # (N,)
     impacts: Array  # (N,)
     time: Array  # (N,) of the frame [s]
-    wait: Array  # (N,) from then until it meets a wall that does not react [s]
-    due: Array  # (N,) when that is
-    wall: Array  # (N,) that wall, or -1 where only so much is known
-    struck: Array  # (N,) the wall that reacts that it meets at its key, or NONE
-    near: Array  # (N,) bool, whether its key holds only until a wall that reacts is struck
-    hits: Array  # (N,) of this frame
-    listed: Array  # (N,) bool, whether it is in `close`
-    close: Array  # (N,) those that are near, and some that were
+    wait: Array  # (N,) from `time` until the next impact on a given wall [s]
+    due: Array  # (N,) the time of this impact [s]
+    wall: Array  # (N,) this wall, or -1 if a flight is free only until `due`
+    struck: Array  # (N,) the reacting wall met at the key, or NONE
+    near: Array  # (N,) bool, whether the key is valid only until a reacting wall is struck
+    hits: Array  # (N,) the impacts in this frame
+    listed: Array  # (N,) bool, whether the particle is in `close`
+    close: Array  # (N,) the particles that are near, and some that were
     heap: Heap
     heat: Any = None  # (walls, N) energy that walls gave, or None
     crossed: Any = None  # `Crossed`, where there are counters
@@ -88,22 +88,22 @@ class Queue(NamedTuple):
     image: Any = None
     absorbed: Any = None  # `Absorbed`, where a wall may absorb particles
     escape_time: Any = None  # (N,) [s], where walls have openings
-    starts: Any = None  # (N,) from when each flies [s], where some are born later, or wait at a wall
+    starts: Any = None  # (N,) the time from which each particle flies [s], where some are born later or wait at a wall
 
 
 class ReactionRule(NamedTuple):
-    """The end of the frame [s since its start], and when to stop."""
+    """How far events are taken: to the end of the frame [s since its start], within the most events of the call."""
 
     end: float
-    halt: Array  # (1,) events
-    moment: float  # the end [s]
+    halt: Array  # (1,) the most events of the call
+    moment: float  # the end of the frame since the start of the run [s]
 
 
-# --- Of one particle -------------------------------------------------------------------------------------
+# --- Events of one particle ------------------------------------------------------------------------------
 
 
 def _aim(scenery, queue, i, end):
-    """Find when particle i meets a wall that does not react, from where it is."""
+    """Find when particle i meets a given wall."""
     walls, t, r, v = scenery.given, queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
     if isinstance(walls, Marched):
         hit = safe.first_hit_moving(walls, scenery.pull, r, v, end - t)
@@ -113,12 +113,12 @@ def _aim(scenery, queue, i, end):
 
 
 def _waits(queue, i):
-    """Whether particle i is not born yet, or waits at a wall: it stays where it is until it is due."""
+    """Whether particle i is not born yet, or waits at a wall: it stays where it is until `due`."""
     return False if queue.starts is None else queue.wall[i] == WAITS
 
 
 def _set_out(scenery, queue, i, rule):
-    """Set the times of particle i at the start of a frame; it flies from there, or from a later birth or release."""
+    """Set the times of particle i at the start of a frame; it flies from then, or from a later birth or release, on."""
     queue.time[i], queue.hits[i] = 0.0, 0
     if is_gone(queue, i):
         return
@@ -135,7 +135,7 @@ def _absorb(queue, i, owner, time):
 
 
 def _escape(queue, i, owner, rule, now):
-    """Particle i has escaped by an opening: it stays where it is, and nothing is next for it."""
+    """Let particle i escape through an opening: it stays where it is, and has no next event."""
     r, v, time = column(queue.position, 0, i), column(queue.velocity, 0, i), rule.moment - (rule.end - now)
     queue.escape_time[i] = time
     if queue.watchers.counters is not None:
@@ -144,7 +144,7 @@ def _escape(queue, i, owner, rule, now):
 
 
 def _seen(scenery, queue, i, now, end):
-    """The `ParticleFlight` of particle i at a time."""
+    """Return the `ParticleFlight` of particle i at a time."""
     t, r, v = now - queue.time[i], column(queue.position, 0, i), column(queue.velocity, 0, i)
     pull, target = scenery.pull, select(queue.due[i] < end, queue.due[i], end)
     here = r + displacement(pull, v, t)
@@ -152,7 +152,7 @@ def _seen(scenery, queue, i, now, end):
 
 
 def _next(scenery, walls, queue, i, now, end, soon):
-    """The time of the next event of particle i; of one far from all walls that react, when it may first reach one."""
+    """Return the time of the next event of particle i, or of its reach if it is far from all reacting walls."""
     if is_gone(queue, i):
         queue.near[i], queue.struck[i] = False, NONE
         return math.inf
@@ -176,7 +176,7 @@ def _next(scenery, walls, queue, i, now, end, soon):
 
 
 def _fly(scenery, queue, i, t, way, end):
-    """Bring particle i to a time, which is so long from where it is."""
+    """Move particle i to the time t, by a flight of the duration `way`."""
     r, v, pull = column(queue.position, 0, i), column(queue.velocity, 0, i), scenery.pull
     there = r + displacement(pull, v, way)
     queue.watchers.flown(pull, queue, i, Flown(r, v, way, end - queue.time[i], there, ZERO))
@@ -187,7 +187,7 @@ def _fly(scenery, queue, i, t, way, end):
 
 @outlined
 def _bounce(scenery, queue, i, wall, rule, now):
-    """The impact of particle i on a wall that does not react."""
+    """Carry out the impact of particle i on a given wall."""
     r, v, m, twice = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i], 2.0 * queue.energy[i]
     walls = scenery.given.at(rule.end - now)
     if walls.inset is not None:
@@ -225,7 +225,7 @@ def _bounce(scenery, queue, i, wall, rule, now):
 
 @outlined
 def _strike(scenery, walls, queue, i, rule, now):
-    """The impact of particle i on a wall that reacts."""
+    """Carry out the impact of particle i on a reacting wall."""
     r, v, m = column(queue.position, 0, i), column(queue.velocity, 0, i), queue.mass[i]
     random, flight = None, ParticleFlight(r, v, ZERO, now, 0.0)
     if queue.escape_time is not None:
@@ -254,11 +254,11 @@ def _strike(scenery, walls, queue, i, rule, now):
     queue.watchers.hit(None, Struck(i, float(blow.owner), time, blow.r, v, v1, blow.impulse, blow.slip))
 
 
-# --- Of all ----------------------------------------------------------------------------------------------
+# --- Events of all particles -----------------------------------------------------------------------------
 
 
 def _soon(clock):
-    """The mean time from one strike of a wall that reacts to the next.
+    """The mean time from one strike of a reacting wall to the next.
 
     A particle that may meet such a wall sooner is looked at again after the next strike.
     """
@@ -267,9 +267,9 @@ def _soon(clock):
 
 @long_kernel
 def predict(scenery, freedoms, queue, clock, rule, first, last):
-    """Find the next events of the particles from `first` to before `last`; no other is touched.
+    """Find the next events of the particles from `first` to before `last`, and change no other particle.
 
-    At the start of a frame also when they meet walls that do not react.
+    At the start of a frame, find also when they meet given walls.
     """
     now = clock[NOW]
     for k in range(first, last):
@@ -281,7 +281,7 @@ def predict(scenery, freedoms, queue, clock, rule, first, last):
 
 @long_kernel
 def arrive(scenery, queue, rule, first, last):
-    """Bring the particles from `first` to before `last` to the end of the frame: how far, before the log is full."""
+    """Bring particles from `first` to before `last` to the frame's end; return where the log is full, or `last`."""
     for k in range(first, last):
         if is_full(queue.watchers.log):
             return k
@@ -292,14 +292,14 @@ def arrive(scenery, queue, rule, first, last):
 
 @long_kernel
 def lease(scenery, freedoms, clock):
-    """New leases of the walls, from the time of the clock on."""
+    """Begin new leases of the walls at the time of the clock."""
     for wall in scenery.reacting:
         wall.freedom.renew(freedoms, clock[NOW])
     clock[TAKEN] = 0.0
 
 
 def _list(queue, close, i):
-    """The number of those that are listed, with particle i if it is near."""
+    """List particle i if it is near; return the number of listed particles."""
     if queue.near[i] and not queue.listed[i]:
         queue.listed[i] = True
         queue.close[close] = i
@@ -309,7 +309,7 @@ def _list(queue, close, i):
 
 @outlined
 def _look_again(scenery, freedoms, queue, clock, rule, close):
-    """After a strike: what is next for those that are near; how many are."""
+    """Find the next events of near particles after a strike; return how many are listed."""
     heap, kept = queue.heap, 0
     for k in range(close):
         item = queue.close[k]
@@ -323,7 +323,7 @@ def _look_again(scenery, freedoms, queue, clock, rule, close):
 
 
 def _carry_out(scenery, freedoms, queue, i, now, rule):
-    """The impact of particle i that is due, and when it meets the next wall that does not react: a status."""
+    """Carry out the event of particle i that is due, and find its next given wall; return a status."""
     if _waits(queue, i):
         queue.time[i] = now
         _aim(scenery, queue, i, rule.end)
@@ -344,7 +344,7 @@ def _carry_out(scenery, freedoms, queue, i, now, rule):
 
 
 def _listed(queue):
-    """List those that are near; how many there are."""
+    """List the near particles; return their number."""
     close = 0
     for k in range(queue.near.size):
         queue.listed[index(k)] = False
@@ -354,15 +354,16 @@ def _listed(queue):
 
 @long_kernel
 def take(scenery, freedoms, queue, clock, rule):
-    """Take event after event until the end of the frame: (status, particle).
+    """Take event after event until the end of the frame; return the status and the particle.
 
-    LEASE_ENDED at the time of the clock: call `lease` and `predict`, and then this again. LOG_FULL: call it again with
-    an empty log. INTERRUPTED after as many events as the rule says: the next call goes on with the same bits.
+    After LEASE_ENDED, at the time of the clock: call `lease`, `predict`, and then this again. After LOG_FULL: call it
+    again with an empty log. The status is INTERRUPTED after `rule.halt` events: the next call goes on with the same
+    bits.
     """
     heap, end, taken = queue.heap, rule.end, 0
     build(heap)
     close = _listed(queue)
-    # When the first lease may end without a strike
+    # The time at which the first lease may end without a strike.
     until = min(freedoms.until)
     while True:
         item = heap.item[0]

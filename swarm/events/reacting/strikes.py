@@ -1,4 +1,4 @@
-"""The walls of a scene that react: each of them, and all of them at once."""
+"""The reacting walls of a scene: one wall, and all of them together."""
 
 import math
 from typing import Any, NamedTuple
@@ -13,23 +13,23 @@ from ...surfaces.fields.members import Members
 from ...surfaces.time_of_impact.flights import NEVER, soonest
 from ...surfaces.walls import Walls
 
-# The energy is that which is left where the square of the speed is off by no more than this part.
+# The relative error of the squared speed up to which the energy after a strike is the one computed from impulses.
 _NEAR = 1e-9
 
 
 class WallImpact(NamedTuple):
-    """A particle after its impact on a wall that reacts, and the impulse [N s]."""
+    """A particle after its impact on a reacting wall, and the impulse [N s]."""
 
     r: Vec  # on the wall
     v: Vec
     impulse: float
-    given: float  # energy that the wall gains, and the spin of a ball [J]
+    given: float  # energy that the wall gains, with that of the spin of a ball [J]
     lost: float  # energy that is dissipated [J]
     owner: Any
-    row: int  # of the books
-    slip: Vec  # velocity relative to the wall along it, before [m/s]
-    heat: float = 0.0  # energy that the wall's law gives besides [J]
-    stays: Any = True  # False where the law absorbs the particle, which keeps its velocity
+    row: int  # in the books
+    slip: Vec  # velocity before the impact, relative to the wall and along it [m/s]
+    heat: float = 0.0  # energy that the law of the wall adds [J]
+    stays: Any = True  # False if the law absorbs the particle, which keeps its velocity
 
 
 class Ball(Record):
@@ -41,7 +41,7 @@ class Ball(Record):
 
 
 class Facing(Record):
-    """A wall as its laws see it, in the velocities of a `Spread`: its normal."""
+    """A wall in the velocities of a `Spread`, as its laws take it: its normal."""
 
     n: Vec
 
@@ -51,15 +51,15 @@ class Facing(Record):
 
 
 class Rubbed(Record):
-    """What friction does in a strike."""
+    """The effect of friction in a strike."""
 
-    impulse: Vec  # besides the normal one, on the wall
+    impulse: Vec  # on the wall, besides the normal impulse
     lost: float  # energy [J]
-    turned: float  # energy of the spin that the ball gains [J]
+    turned: float  # energy that the spin of the ball gains [J]
 
 
 class LawImpulse(Record):
-    """The impulse of a strike on the wall by a law of that, and what this takes and gives of the energy [J]."""
+    """The impulse on a wall of a strike by a law of the wall, and the energy that the law takes and gives [J]."""
 
     impulse: Vec
     lost: float
@@ -68,20 +68,20 @@ class LawImpulse(Record):
 
 
 class Reacting(Record):
-    """A wall that reacts."""
+    """A reacting wall."""
 
     body: Any
-    freedom: Any  # how it may move
+    freedom: Any  # the `Freedom` of its motion
     owner: Any  # its number among all walls of the scene
-    row: int  # that of the books of the scene
+    row: int  # its row in the books of the scene
     restitution: float
-    laws: Any = None  # None, or the `Laws` of the surface, where they are more than a restitution
-    number: float = 0.0  # among the walls of the surface
-    absorbs: Any = None  # 1 where a law may absorb particles
+    laws: Any = None  # None, or the `Laws` of the surface, if they are more than a restitution
+    number: float = 0.0  # its number among the walls of the surface
+    absorbs: Any = None  # 1 if a law may absorb particles, or None
     openings: Any = None  # None, or each `Opened`, which move with the wall
 
     def count(self):
-        """How many walls it is."""
+        """The number of walls: 1, or those of a field."""
         return self.body.count() if isinstance(self.body, Members) else 1.0
 
     def grown(self, radius):
@@ -89,7 +89,7 @@ class Reacting(Record):
         return self._replace(body=self.body.grown(radius))
 
     def one(self, number):
-        """Of a field one of its walls."""
+        """The wall with a number in a field; else the wall itself."""
         if not isinstance(self.body, Members):
             return self
         return self._replace(
@@ -97,17 +97,17 @@ class Reacting(Record):
         )  # fmt: skip
 
     def lets_out(self, walls, flight, radius):
-        """Whether it is open where a particle meets it, or a ball of this radius."""
+        """Whether the wall is open where a particle, or a ball of this radius, meets it."""
         surface = self.freedom.posed(self.body, walls, flight.time)
         foot = surface.own_place(flight.r + radius * surface.unit_normal(flight.r))
         return lets_through(self.openings, Walls((self.body,)), self.number, foot, 0.0)
 
     def strike(self, walls, flight, mass, random=None, ball=None):
-        """The impact of a particle, a `Ball` or a point, on it: its `WallImpact`."""
+        """Carry out the impact of a particle, a `Ball` or a point, on the wall; return its `WallImpact`."""
         freedom = self.freedom
         surface = freedom.posed(self.body, walls, flight.time)
-        # The time of the frame has fewer digits than the flight: without this a particle is found in the wall next
-        # time.
+        # The time of the frame has fewer digits than the flight: without a projection the particle may begin its next
+        # flight inside the wall.
         r = surface.project(flight.r)
         n = surface.unit_normal(r)
         touch = r if ball is None else r + ball.radius * n
@@ -140,14 +140,14 @@ class Reacting(Record):
         given = dot(u, whole) + 0.5 * freedom.mobility(whole, arm) + turned
         v1, stays = flight.v - (1.0 / mass) * whole, True
         if self.absorbs is not None:
-            # What is absorbed gives its normal momentum to the wall, and keeps its velocity and its energy.
+            # An absorbed particle gives its normal momentum to the wall, and keeps its velocity and its energy.
             stays = law.stays | (not happens)
             more, less = (given, 0.0) if self.laws.give_heat else (0.0, -given)
             v1, heat, lost = either(stays, v1, flight.v), select(stays, heat, more), select(stays, lost, less)
         return WallImpact(r, v1, impulse, given, lost, self.owner, self.row, slip, heat, stays)
 
     def _by_law(self, r, n, w, at, random):
-        """Whether a law acts on a particle of the relative velocity w, and the `LawImpulse` then."""
+        """Return whether a law acts on a particle with the relative velocity w, and its `LawImpulse`."""
         mass, arm = at
         spread = self.freedom.spread(mass, arm)
         facing, before = spread.out(n), spread.back(w)
@@ -163,7 +163,7 @@ class Reacting(Record):
         return happens, LawImpulse(mass * spread.back(change), half * bounce.lost, half * bounce.heat, stays)
 
     def _rubbed(self, n, passing, at, impulse, ball):
-        """What friction takes, of a velocity relative to the wall after a normal impulse: `Rubbed`."""
+        """Return the `Rubbed` of a strike; `passing` is the velocity relative to the wall after the normal impulse."""
         mass, arm = at
         slip, give = passing - dot(passing, n) * n, 1.0 / mass
         turns = ball is not None and ball.turning is not None
@@ -182,7 +182,7 @@ class Reacting(Record):
 
 
 def reach_of_all(reacting, walls, flight):
-    """A time during which a flight meets none of the walls, whatever others do to them within their leases."""
+    """A time in which a flight meets none of the walls, whatever impacts do to them within their leases."""
     time = math.inf
     for wall in reversed(reacting):
         first = wall.freedom.reach(wall.body, walls, flight)
@@ -191,7 +191,7 @@ def reach_of_all(reacting, walls, flight):
 
 
 def numbered(reacting):
-    """(number, `Reacting`) of each; of a field it is that of its first wall."""
+    """The pairs (number, `Reacting`) of the walls; the number of a field is that of its first wall."""
     found: Any = ()
     number = 0.0
     for wall in reacting:
@@ -201,12 +201,12 @@ def numbered(reacting):
 
 
 def is_of(wall, number, one):
-    """Whether the wall with a number is this one, which has the number, or one of its field."""
+    """Whether the number `wall` is that of `one`, which has `number`, or of a wall in the field `one`."""
     return (wall >= number) & (wall < number + one.count()) if isinstance(one.body, Members) else wall == number
 
 
 def first_hit(reacting, gravity, walls, flight):
-    """The first `Hit` of a flight, if nothing else strikes the walls before."""
+    """Return the first `Hit` of a flight, if nothing else strikes the walls before."""
     hit = NEVER
     for number, wall in reversed(numbered(reacting)):
         hit = soonest(wall.freedom.hit(wall.body, gravity, walls, flight), number, hit)
@@ -214,7 +214,7 @@ def first_hit(reacting, gravity, walls, flight):
 
 
 def exit_at(reacting, wall, walls, flight, radius=0.0):
-    """The number in the scene of the wall with this number, where it is open to a particle that meets it; else -1."""
+    """Return the number of a wall in the scene if it is open to a particle that meets it, else -1."""
     owner = -1.0
     for number, several in numbered(reacting):
         if several.openings is not None:
@@ -225,7 +225,7 @@ def exit_at(reacting, wall, walls, flight, radius=0.0):
 
 
 def strike(reacting, wall, walls, flight, mass, random=None, ball=None):
-    """The impact of a particle on the wall with this number: its `WallImpact`."""
+    """Carry out the impact of a particle on the wall with a number; return its `WallImpact`."""
     for number, one in numbered(reacting):
         if is_of(wall, number, one):
             return one.one(wall - number).strike(walls, flight, mass, random, ball)
@@ -233,10 +233,10 @@ def strike(reacting, wall, walls, flight, mass, random=None, ball=None):
 
 
 def with_energy(v, left, fall):
-    """A velocity after a strike with the energy that is left, and that energy: both twice and per mass, with weight.
+    """Return a velocity after a strike scaled to the energy `left`, and its energy: twice, per mass, and with weight.
 
-    The energy decides the speed: round-off of the impulse has a bias, 1e-16 of the energy an impact. Of a particle that
-    all but stops nothing is restored, and the energy is that of its velocity.
+    The energy determines the speed, as round-off of the impulse has a bias, 1e-16 of the energy an impact. A particle
+    that nearly stops is not scaled, and its energy is that of its velocity.
     """
     v1 = with_square(v, left - fall)
     now = square(v1) + fall
@@ -244,7 +244,7 @@ def with_energy(v, left, fall):
 
 
 def all_stay(reacting, wall, walls):
-    """Whether the wall with this number, which was just struck, is within its lease."""
+    """Whether the wall with a number, which was just struck, is within its lease."""
     for number, one in numbered(reacting):
         if is_of(wall, number, one):
             return one.freedom.stays(walls)

@@ -1,1 +1,1 @@
-"""Checks before a run: what it needs, what its engine supports, what the user may not have meant."""
+"""Checks before a run: its arguments, the capabilities of its engine, and properties that may not be meant."""

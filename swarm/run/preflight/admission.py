@@ -27,16 +27,16 @@ from .softness import depths_at_start
 from .starts import require_inside
 
 # The length of the way ahead that shows on which side of a wall a flight begins, as a part of the size of the scene. A
-# flight that begins in a tip is outside at its end by more than the second part of that way.
+# flight that begins in a tip is outside at its end by more than the part `_TIP` of this way.
 _NEAR, _TIP = 1e-6, 1e-2
-# Of a time that is this many lengths of the run ago, float64 resolves a ten-thousandth of the run.
+# The earliest time of a path, in lengths of the run: there float64 resolves a ten-thousandth of the run.
 _LONG_AGO = 1e12
-# A float does not hold larger whole numbers exactly; the numbers of images are multiplied by lengths.
+# The most cells: floats do not hold all larger whole numbers, and the numbers of images are multiplied by lengths.
 _MOST_CELLS = 2.0**53
 
 
 def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: Method, options: RunOptions) -> Task:
-    """The checked run, with a copy of the particles of the start, followed by those that sources add.
+    """Return the checked run, with a copy of the particles of the start, followed by those that sources add.
 
     Raises:
         SceneError: an argument is wrong, or the arguments do not go together.
@@ -56,11 +56,11 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
         _require_motions(scene, options.times.until)
         task: Task = engines.wing("bodies.admission").task_of(scene, particles, method, options)
         return task
-    # The arrays of Particles may have been changed since it checked them.
+    # The arrays of particles may have been changed since they were checked.
     start = None if particles is None else _in_the_cell(scene, particles.copy(), options.times.until)
     check_surfaces(method, scene)
     times = options.times
-    # The balls of the start and those of sources.
+    # The balls of the start and the balls of sources.
     balls = _balls(scene, start, method, options)
     radius = None if balls is None else balls.radius
     compiled = scene.compiled(None if radius is None else float(radius.max()), method.apart())
@@ -92,7 +92,7 @@ def task_of(scene: Scene, particles: Particles | TiedParticles | None, method: M
 
 
 def _balls(scene: Scene, start: Particles | None, method: Method, options: RunOptions) -> Particles | None:
-    """The balls of a run, with all checks but those of their places; None in a run of points."""
+    """Return the balls of a run, with all checks but those of their places; None in a run of points."""
     if start.radius is None if start is not None else options.sources[0].radius is None:
         return None
     balls = with_births(scene, start, options.sources, options.seed, options.until)
@@ -101,7 +101,7 @@ def _balls(scene: Scene, start: Particles | None, method: Method, options: RunOp
 
 
 def _require_laws_applied(compiled: CompiledScene, method: Method) -> None:
-    """Raise a `SceneError` where walls have losses or laws that a user-defined method does not apply."""
+    """Raise a `SceneError` if walls have losses or laws that a user-defined method does not apply."""
     laws, name = compiled.laws, type(method).__name__
     if laws is None or not (laws.loses or laws.send_off) or ALL_METHODS.kind_of(type(method)) is not None:
         return
@@ -109,7 +109,7 @@ def _require_laws_applied(compiled: CompiledScene, method: Method) -> None:
     if numbers.laws is NONE and numbers.laws_at_ends is None:
         raise SceneError(
             f"method must apply the restitution, friction, temperature and laws of walls, got {name}; its numbers "
-            "have no `laws`; leave those of the walls out, use Impact, or give the numbers `laws` and apply them in "
+            "have no `laws`; leave them out of the walls, use Impact, or give the numbers `laws` and apply them in "
             "`contact`, see help(swarm.methods.contract)"
         )
 
@@ -121,9 +121,9 @@ def _require_motions(scene: Scene, until: float) -> None:
             if isinstance(one, Path) and not one.times[0] <= 0.0 <= until <= one.times[-1]:
                 raise SceneError(
                     f"surfaces[{i}].motion.times must cover the run from 0 to {until:g} s, got {one.times[0]:g} to "
-                    f"{one.times[-1]:g}; add what is missing, at rest if the wall is so there, or give another until"
+                    f"{one.times[-1]:g}; add the missing times, or give another until"
                 )
-            # A piece of a path counts the time since its start: long after that, float64 resolves nothing of this run.
+            # A piece of a path counts the time since its start: long after it, float64 does not resolve this run.
             if isinstance(one, Path) and max(t for t in one.times if t <= 0.0) < -_LONG_AGO * until:
                 raise SceneError(
                     f"surfaces[{i}].motion.times must have one at 0 s or at most {_LONG_AGO:g} times the length of the "
@@ -133,7 +133,7 @@ def _require_motions(scene: Scene, until: float) -> None:
 
 
 def _in_the_cell(scene: Scene, particles: Particles, until: float) -> Particles:
-    """The particles, with their positions in the cell and their images where the scene repeats."""
+    """Return the particles, in a periodic scene with positions in the cell and images."""
     if scene.period is None:
         if particles.image is not None:
             raise SceneError(
@@ -148,7 +148,7 @@ def _in_the_cell(scene: Scene, particles: Particles, until: float) -> Particles:
 
 
 def _require_countable(scene: Scene, particles: Particles, until: float) -> None:
-    """Raise a `SceneError` where a particle may come through more cells than a file can count."""
+    """Raise a `SceneError` if a particle may come through more cells than a file can count."""
     for k, length in enumerate(scene.period or ()):
         if length is None:
             continue
@@ -164,7 +164,7 @@ def _require_countable(scene: Scene, particles: Particles, until: float) -> None
 
 
 def _require_normals(scene: Scene, particles: Particles) -> None:
-    """Raise a `SceneError` for a flight out of the tip of a cone, where no normal says how it is reflected."""
+    """Raise a `SceneError` for a flight out of the tip of a cone, where no normal determines its reflection."""
     step = _NEAR * scene.finite_size()
     for i, surface in enumerate(scene.surfaces):
         if not surface.may_have_tip or surface.motion is not None:
@@ -173,7 +173,7 @@ def _require_normals(scene: Scene, particles: Particles) -> None:
         r, v = particles.position[:, on_wall], particles.velocity[:, on_wall]
         speed = np.sqrt((v**2).sum(axis=0))
         ahead = r + v * (step / np.where(speed > 0.0, speed, 1.0))
-        # Where the wall has a normal, a flight that does not go against it is outside by the square of the way at most.
+        # If the wall has a normal, a flight that is not against it is outside by the square of the way at most.
         against = (gradient_of((surface,), r) * v).sum(axis=0) > 0.0
         slope = np.sqrt((surface.gradient(ahead) ** 2).sum(axis=0))
         lost = np.flatnonzero((speed > 0.0) & ~against & (gaps_of((surface,), ahead, 0.0)[0] > _TIP * step * slope))

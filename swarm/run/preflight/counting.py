@@ -24,27 +24,27 @@ from ...surfaces.surface import Surface
 from ...surfaces.union import Union
 from ..options import RunOptions
 
-# The part of the size of a scene and of a counter that is round-off: rooms that touch are three times 1e-13 apart.
+# The round-off relative to the size of a scene and of a counter: rooms that touch are three times 1e-13 apart.
 _NEAR = 1e-12
-# The part by which a ball is larger than what is in it.
+# The part by which a ball is larger than the box in it.
 _ROOM = 1e-9
 # The most walls of all counters: each is compiled into the kernels.
 _MOST = 24
-# The most cells that a particle may come through in a frame: seconds.
+# The most cells that a particle may come through in a frame: this takes seconds.
 _MOST_CELLS = 1e7
-# The sides of so many particles are found at once.
+# The number of particles with sides that are found together.
 _AT_ONCE = 65_536
 
 
 def require_counters(scene: Scene, particles: Particles, options: RunOptions) -> None:
-    """Raise a `SceneError` where a surface cannot be a counter in this scene, or is crossed too often."""
+    """Raise a `SceneError` if a surface cannot be a counter in this scene, or may be crossed too often."""
     if options.counters:
         counters_of(scene, options.counters)
         _require_few_cells(scene, particles, options)
 
 
 def require_compiled(scene: Scene, options: RunOptions) -> None:
-    """Raise a `SceneError` where a surface of a run, or of a counter, cannot be compiled."""
+    """Raise a `SceneError` if a surface of a run, or of a counter, cannot be compiled."""
     if options.compile != "never":
         counters = [one for counter in options.counters for one in (counter.surface, counter.inside) if one is not None]
         for surface in [*scene.surfaces, *scene.pieces.open_volumes(), *counters]:
@@ -52,7 +52,7 @@ def require_compiled(scene: Scene, options: RunOptions) -> None:
 
 
 def _require_few_cells(scene: Scene, particles: Particles, options: RunOptions) -> None:
-    """Raise a `SceneError` where a flight may cross counters in more cells than can be looked at in a while."""
+    """Raise a `SceneError` if a flight may cross counters in too many cells in a frame."""
     every = options.times.every
     assert every is not None
     for k, length in enumerate(scene.period or ()):
@@ -60,16 +60,16 @@ def _require_few_cells(scene: Scene, particles: Particles, options: RunOptions) 
         fastest = particles.fastest() + pull * options.times.until
         if length is not None and not fastest * every / length <= _MOST_CELLS:
             raise SceneError(
-                f"period[{k}] must be so long that particles come through at most {_MOST_CELLS:g} cells a frame where "
-                f"there are counters, which are in each, got {length:g} m for {fastest * every / length:.3g} cells; "
-                "give a longer period, or more frames (every)"
+                f"period[{k}] must be so long that particles come through at most {_MOST_CELLS:g} cells a frame in a "
+                f"run with counters, which are in each cell, got {length:g} m for {fastest * every / length:.3g} "
+                "cells; give a longer period, or more frames (every)"
             )
 
 
 def counters_of(scene: Scene, given: tuple[Counter, ...], logs: bool = False) -> Counters | None:
-    """The counters as kernels take them, or None if none is given; `logs`: their crossings are logged.
+    """Return the counters as kernels take them, or None without counters; `logs`: their crossings are logged.
 
-    `logs` is true of crossings by steps too, which are counted one by one.
+    `logs` is also true for crossings by steps, which are counted one by one.
 
     Raises:
         SceneError: a surface cannot be a counter in this scene.
@@ -79,8 +79,8 @@ def counters_of(scene: Scene, given: tuple[Counter, ...], logs: bool = False) ->
     walls = sum(len(one.surface.walls()) for one in given if not one.surface.is_field)
     if walls > _MOST:
         raise SceneError(
-            f"counters must have at most {_MOST} walls in all, got {walls}: each is compiled into the kernels; of many "
-            "of one kind make one of many bodies, such as swarm.Spheres"
+            f"counters must have at most {_MOST} walls in all, got {walls}: each is compiled into the kernels; use one "
+            "surface of many bodies, such as swarm.Spheres, in place of many of one kind"
         )
     quiet = 0.0 if scene.period is None and not logs else None
     each = tuple(_counted(scene, f"counters[{k}]", one) for k, one in enumerate(given))
@@ -108,7 +108,7 @@ def _counted(scene: Scene, name: str, counter: Counter) -> Counted:
 
 
 def _ball_around(*given: Any) -> Any:
-    """A solid ball around the side of a surface that has bounds, or None."""
+    """Return a solid ball around the bounded side of a surface, or None."""
     *sides, near = given
     for one in sides:
         low, high = (np.array(corner) for corner in one.enclosing_box())
@@ -119,7 +119,7 @@ def _ball_around(*given: Any) -> Any:
 
 
 def _require_no_mesh(name: str, surface: Surface, verb: str) -> None:
-    """Raise a `SceneError` for exact triangles: kernels cannot compute the distance of a place from these."""
+    """Raise a `SceneError` for exact triangles, from which kernels cannot compute the distance of a place."""
     if any(isinstance(one, Mesh) for one in surface.surfaces()):
         raise SceneError(
             f"{name} must not be of a Mesh, which is known at its triangles only, got {surface!r:.200}; {verb} "
@@ -128,7 +128,7 @@ def _require_no_mesh(name: str, surface: Surface, verb: str) -> None:
 
 
 def _alone(scene: Scene, name: str, surface: Surface) -> Scene:
-    """The scene of a counter alone."""
+    """Return the scene with only a counter."""
     try:
         return Scene([surface], scene.gravity, plane=scene.plane)
     except SceneError as error:
@@ -136,7 +136,7 @@ def _alone(scene: Scene, name: str, surface: Surface) -> Scene:
 
 
 def _whole(scene: Scene, name: str, surface: Surface) -> Surface:
-    """The surface with its images, as far as they reach into the cell where the scene repeats."""
+    """Return the surface, in a periodic scene with its images that reach into the cell."""
     period, side = scene.period, getattr(surface, "side", None)
     if period is None or side is None or surface.face_noun:
         return surface
@@ -146,7 +146,7 @@ def _whole(scene: Scene, name: str, surface: Surface) -> Surface:
     except SceneError:
         if all(map(math.isfinite, np.ravel(other_side(solid).bounds()))):
             raise
-        # An unbounded surface counts as far as it is in the cell.
+        # The part of an unbounded surface in the cell counts.
         return surface
     if len(images) == 1:
         return images[0] if side == "outside" else other_side(images[0])
@@ -154,7 +154,7 @@ def _whole(scene: Scene, name: str, surface: Surface) -> Surface:
 
 
 def _one_wall(surface: Surface) -> Any:
-    """The wall of a surface if it differs between its two sides by the sign alone, else None."""
+    """Return the wall of a surface if its two sides differ only by the sign, else None."""
     walls = () if surface.is_field else surface.walls()
     return walls[0].reversible() if len(walls) == 1 else None
 
@@ -163,12 +163,12 @@ def _one_wall(surface: Surface) -> Any:
 
 
 def with_counters(state: State, counters: Counters | None, given: tuple[Counter, ...], scene: Scene) -> State:
-    """The state at its start with arrays for these counters."""
+    """Return the state at the start with arrays for these counters."""
     return state if counters is None else state._replace(crossed=crossed_of(counters, given, scene, state.position))
 
 
 def crossed_of(counters: Counters, given: tuple[Counter, ...], scene: Scene, position: NDArray[Any]) -> Crossed:
-    """The arrays of a run at its start; a particle on a counter is on its admissible side."""
+    """Return the arrays of counters at the start; a particle on a counter is on its admissible side."""
     n = position.shape[1]
     side = np.zeros((len(given), n), np.int8)
     for k, (one, counter) in enumerate(zip(counters.each, given, strict=True)):

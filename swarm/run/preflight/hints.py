@@ -1,4 +1,4 @@
-"""Warnings before a run starts, of what its user may not have meant: cavities, times, steps, gravity."""
+"""Warnings before a run starts about properties that its user may not have meant: cavities, times, steps, gravity."""
 
 import itertools
 import logging
@@ -19,16 +19,17 @@ from ..options import Task
 from . import softness, workload
 
 _LOG = logging.getLogger("swarm")
-# A run warns of a step, a contact and a round-off of a time above these parts of the time between impacts.
+# A run warns of a step, a contact and a round-off of times above these parts of the time between impacts.
 _STEP, _CONTACT, _ROUND_OFF = 0.25, 0.5, 1e-4
-# The time between impacts takes long to compute: it is asked for only where a step, a contact or a round-off is longer
-# than this fraction of what it may be if that time were the time to cross the scene.
+# The time between impacts takes long to compute. It is needed only if a step, a contact or a round-off is longer than
+# this fraction of its limit, with the time to cross the scene in place of the time between impacts.
 _SURELY = 1e-2
 # Explicit steps of a spring are stable up to this number over its angular frequency.
 _STABLE = 2.0
 # The number of particles in a sample.
 _LOOKED_AT = 1000
-# Two cavities are compared at so many points. They cut one another if more than this part of each is outside the other.
+# The points at which two cavities are compared. They cut one another if more than the part `_CUT` of each is outside of
+# the other.
 _POINTS, _CUT = 4096, 0.01
 _IN_ONE_PLACE = (
     "%s and %s have faces in one place, with the same side: an impact there follows the "
@@ -42,7 +43,7 @@ _ONLY_TOUCH = (
 
 
 def give(task: Task) -> None:
-    """Warn of what the run will do and its user may not have meant."""
+    """Warn of properties of the run that its user may not have meant."""
     warn_of_overlap(task.scene)
     warn_of_walls_in_one_place(task.scene, task.bodies is not None or task.particles.radius is None)
     _warn_of_faces(task.scene)
@@ -51,7 +52,7 @@ def give(task: Task) -> None:
     _warn_of_light(task)
     softness.warn_of_depths(task)
     if task.bodies is None and task.particles.radius is None and len(task.particles):
-        # The speed of the fastest in a sample.
+        # The speed of the fastest particle in a sample.
         some = task.particles.velocity[:, _some(len(task.particles))]
         fastest = float(np.sqrt((some**2).sum(axis=0).max()))
         # The speed after a fall through the scene.
@@ -66,7 +67,7 @@ def give(task: Task) -> None:
 
 
 def _some(count: int) -> slice:
-    """The sample of so many particles."""
+    """Return the sample of `count` particles."""
     return slice(0, None, max(1, count // _LOOKED_AT))
 
 
@@ -78,7 +79,7 @@ def _takes_energy(compiled: CompiledScene) -> bool:
 
 
 def _warn_of_fall(compiled: CompiledScene) -> None:
-    """Warn where gravity pulls along a period, and nothing ends the fall."""
+    """Warn if gravity pulls along a period, and nothing ends the fall."""
     scene = compiled.scene
     pulls = scene.gravity or (0.0, 0.0, 0.0)
     for k, (length, pull) in enumerate(zip(scene.period or (), pulls, strict=False)):
@@ -93,7 +94,7 @@ def _warn_of_fall(compiled: CompiledScene) -> None:
 
 
 def _warn_of_faces(scene: Scene) -> None:
-    """Warn where parts of a union with a common face at the start do not move as one: there is a wall between them."""
+    """Warn if parts of a union with a common face at the start move differently: there is a wall between them."""
     for i, surface in enumerate(scene.surfaces):
         for one, other in surface.moving_apart() if len(surface.rooms) > 1 else ():
             _LOG.warning(
@@ -104,7 +105,7 @@ def _warn_of_faces(scene: Scene) -> None:
 
 
 def _warn_of_counters(task: Task) -> None:
-    """Warn where balls leave through an opening before their centres have come to a counter there."""
+    """Warn if balls leave through an opening before their centres have come to a counter there."""
     scene, counters = task.scene, task.options.counters
     radii = [source.largest() for source in task.options.sources]
     radii += [] if task.particles.radius is None else [float(task.particles.radius.max(initial=0.0))]
@@ -127,7 +128,7 @@ def _warn_of_counters(task: Task) -> None:
 
 
 def _warn_of_light(task: Task) -> None:
-    """Warn where a temperature in kelvin, or a speed of another unit, makes particles faster than light."""
+    """Warn if a temperature in kelvin, or a speed in another unit, makes particles faster than light."""
     particles = task.particles
     heat = max((one.temperature or 0.0 for one in task.scene.surfaces), default=0.0)
     hot, fastest = math.sqrt(heat / float(particles.mass.min())) if len(particles) else 0.0, particles.fastest()
@@ -138,7 +139,7 @@ def _warn_of_light(task: Task) -> None:
 
 
 def _warn_of_rest(task: Task) -> None:
-    """Warn where no particle will move."""
+    """Warn if no particle will move."""
     scene = task.scene
     is_moved = scene.gravity is not None or scene.moves() or scene.has_doors() or bool(task.options.sources)
     if not is_moved and task.particles.fastest() == 0.0:
@@ -150,7 +151,7 @@ def _warn_of_rest(task: Task) -> None:
 
 
 def _warn_of_times(task: Task, crossing: float) -> None:
-    """Warn where a run is so long that float64 does not resolve the times of its last impacts."""
+    """Warn if a run is so long that float64 does not resolve the times of its last impacts."""
     scene, until = task.scene, task.options.until
     every = task.options.times.every
     assert every is not None
@@ -159,7 +160,7 @@ def _warn_of_times(task: Task, crossing: float) -> None:
         return
     between = workload.time_between(task.compiled, task.particles)
     if kept > _ROUND_OFF * between:
-        # Within a frame times are counted from its end.
+        # Times within a frame are counted from its end.
         inside = float(np.spacing(every)) > _ROUND_OFF * between
         flights = "flights too, in frames this long" if inside else "flights are not: each frame counts from its end"
         _LOG.warning(
@@ -171,7 +172,7 @@ def _warn_of_times(task: Task, crossing: float) -> None:
 
 
 def _warn_of_steps(task: Task, speed: float, crossing: float) -> None:
-    """Warn where a step, or a contact with a soft wall, is a large part of the time between impacts."""
+    """Warn if a step, or a contact with a soft wall, is a large part of the time between impacts."""
     scene, particles, method = task.scene, task.particles, task.method
     name = "contact_step" if isinstance(method, Impact) else "dt"
     step, law = getattr(method, name, None), method.law()
@@ -203,7 +204,7 @@ def _warn_of_steps(task: Task, speed: float, crossing: float) -> None:
 
 
 def _contact(task: Task, speed: float) -> tuple[float, float]:
-    """How long the shortest contact with a soft wall lasts [s], and how deep the fastest sinks in [m].
+    """Return the duration of the shortest contact with a soft wall [s], and the depth of the fastest particle [m].
 
     The gap g obeys m g'' = -alpha s^2 g^a, with the slope s of phi: see `_contact_time` of grains.
     """
@@ -222,7 +223,7 @@ def _contact(task: Task, speed: float) -> tuple[float, float]:
 
 
 def warn_of_overlap(scene: Scene) -> None:
-    """Warn of the first two cavities, each bounded by itself, of which neither is inside the other."""
+    """Warn of the first two bounded cavities that overlap only in part."""
     boxes = np.array([box_of(one, 0.0) for one in scene.surfaces]).reshape(-1, 2, 3)
     if (across := scene.across()) is not None:
         boxes[:, :, across] = 0.0
@@ -231,15 +232,15 @@ def warn_of_overlap(scene: Scene) -> None:
     for (i, one), (j, other) in itertools.combinations(bounded, 2):
         if are_there_together(one, other) and _cut_one_another(one, other, boxes[[i, j]]):
             _LOG.warning(
-                "surfaces[%d] (%s) and surfaces[%d] (%s) overlap only in part: particles are kept in what they have in "
-                'common; a vessel of both is one surface, swarm.Union([...]), in a scene file kind = "union"',
+                "surfaces[%d] (%s) and surfaces[%d] (%s) overlap only in part: particles stay in their common "
+                'part; a vessel of both is one surface, swarm.Union([...]), in a scene file kind = "union"',
                 i, type(one).__name__, j, type(other).__name__,
             )  # fmt: skip
             return
 
 
 def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
-    """Warn of the first two surfaces with flat faces in one place: of two laws, or with a gap of no width between them.
+    """Warn of the first two flat faces in one place with different laws, or with a gap of no width between them.
 
     Args:
         scene: the scene.
@@ -255,7 +256,7 @@ def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
     def matters(one: Surface, other: Surface, are_back_to_back: bool) -> bool:
         return of_points and (one.is_solid() or other.is_solid()) if are_back_to_back else _differ(one, other)
 
-    # Those that reach into what they stand on.
+    # The bodies that reach into the surface on which they stand.
     reaching = [k for k, one in enumerate(bodies) if flush.may_reach(one, scene.surfaces)] if of_points else []
     closed = {(reaching[i], face) for i, face in flush.flush_faces([surfaces[k] for k in reaching])}
     for pair in flush.pairs_in_one_place(surfaces, size, matters):

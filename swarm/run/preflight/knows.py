@@ -1,9 +1,9 @@
-"""What each engine supports, and the sentences of the errors for what it does not support.
+"""The capabilities of each engine, and the sentences of the errors for capabilities that it does not support.
 
-The particles of a run, its method, and whether impacts move a wall determine its engine. A capability is something that
-a run may ask for: a law of a wall, a source, a period. `CAPABILITIES` has a `Refusal` for each pair of an engine and a
-capability that is not supported; all other pairs are. `require_supported` raises the first one that applies to a run,
-before anything is compiled.
+The particles of a run, its method, and whether impacts move a wall determine its engine. A capability is a property
+that a run may have: a law of a wall, a source, a period. `CAPABILITIES` has a `Refusal` for each pair of an engine
+and a capability that is not supported; all other pairs are supported. `require_supported` raises the first refusal
+that applies to a run, before anything is compiled.
 """
 
 import functools
@@ -28,7 +28,7 @@ POINTS, CHORDS, MASSIVE = "points with Impact", "points with a contact_step", "p
 SOFT, PAPER, BASELINE = "points with Penalty", "points with AugmentedLagrangian", "points with a baseline"
 BALLS, HEAVY, GRAINS = "balls with Impact", "balls and walls with a mass", "balls with Penalty"
 BODIES, SOFT_BODIES, PAPER_BODIES = "bodies with Impact", "bodies with Penalty", "bodies with AugmentedLagrangian"
-# Balls and bodies with a method that they do not support; points with a user-defined one, which has checks of its own.
+# Balls and bodies with a method that they do not support; points with a user-defined method, which has its own checks.
 OTHER_POINTS, OTHER_BALLS, OTHER_BODIES = (f"{kind} with another method" for kind in ("points", "balls", "bodies"))
 
 _RIGID_POINTS, _FIXED_STEPS = (POINTS, CHORDS, MASSIVE), (SOFT, PAPER, BASELINE)
@@ -41,7 +41,7 @@ _ALONE = (*_EVERY_POINT, OTHER_POINTS)
 
 
 class Asked(NamedTuple):
-    """The arguments of a run, of the right types; the particles are None where all come from sources."""
+    """The arguments of a run, with the right types; `particles` is None if all come from sources."""
 
     scene: Scene
     particles: Particles | TiedParticles | None
@@ -50,7 +50,7 @@ class Asked(NamedTuple):
 
 
 def engine_of(asked: Asked) -> str:
-    """The engine of a run: one of `ENGINES`, or `OTHER_POINTS`, `OTHER_BALLS` or `OTHER_BODIES`."""
+    """Return the engine of a run: one of `ENGINES`, or `OTHER_POINTS`, `OTHER_BALLS` or `OTHER_BODIES`."""
     scene, particles, method, options = asked
     if isinstance(particles, TiedParticles):
         return _by_method(method, (BODIES, SOFT_BODIES, PAPER_BODIES), OTHER_BODIES)
@@ -67,7 +67,7 @@ def engine_of(asked: Asked) -> str:
 def _by_method(method: Method, engines: tuple[str, str, str], other: str) -> str:
     if isinstance(method, Impact):
         return engines[0]
-    from ...methods import AugmentedLagrangian, Penalty  # loaded where one is used
+    from ...methods import AugmentedLagrangian, Penalty  # loaded only if used
 
     kinds = zip((Penalty, AugmentedLagrangian), engines[1:], strict=True)
     return next((engine for kind, engine in kinds if isinstance(method, kind)), other)
@@ -75,12 +75,12 @@ def _by_method(method: Method, engines: tuple[str, str, str], other: str) -> str
 
 # --- Capabilities ----------------------------------------------------------------------------------------
 
-# Where a run asks for a capability, as the fields of its sentence: `i` the surface, `k` its law, `got` the value.
+# The places where a run needs a capability, as fields of its sentence: `i` the surface, `k` its law, `got` the value.
 Found = Iterator[dict[str, Any]]
 
 
 def _of_walls(name: str, without: Any) -> Callable[[Asked], Found]:
-    """A function that finds the walls with another value of an attribute than `without`."""
+    """Return a function that finds the walls with another value of an attribute than `without`."""
 
     def found(asked: Asked) -> Found:
         for i, wall in asked.scene.pieces.owned():
@@ -91,7 +91,7 @@ def _of_walls(name: str, without: Any) -> Callable[[Asked], Found]:
 
 
 def _given(path: str, *without: Any) -> Callable[[Asked], Found]:
-    """A function that finds another value than these at a path of attributes; the first is that of a missing one."""
+    """Return a function that finds another value than these at a path of attributes; a missing one has the first."""
     without = without or (None, False, ())
 
     def found(asked: Asked) -> Found:
@@ -103,14 +103,14 @@ def _given(path: str, *without: Any) -> Callable[[Asked], Found]:
 
 
 def _shown(got: Any) -> dict[str, Any]:
-    """A value, and how many it is, as fields of a sentence."""
+    """Return a value, and the number of its entries, as fields of a sentence."""
     return {"got": f"{got:g}" if isinstance(got, float) else got, "count": len(got) if isinstance(got, tuple) else 1}
 
 
 def _where(
     holds: Callable[[Asked], Any], found: Callable[[Asked], Found] = lambda asked: iter([{}])
 ) -> Callable[[Asked], Found]:
-    """A function that finds what `found` does in a run for which a condition holds, and nothing in any other."""
+    """Return a function with the results of `found` in a run for which a condition holds, else without results."""
     return lambda asked: found(asked) if holds(asked) else iter(())
 
 
@@ -156,7 +156,7 @@ def _losses_under_gravity(asked: Asked) -> Found:
 
 
 def _rooms(asked: Asked) -> Found:
-    """Unions of several rooms, and foams."""
+    """Yield unions of several rooms, and foams."""
     for i, surface in enumerate(asked.scene.surfaces):
         if i in asked.scene.compiled().unions() or surface.is_foam():
             yield {"i": i, "got": surface}
@@ -167,7 +167,7 @@ def _unions(asked: Asked) -> Found:
 
 
 def _takes_rooms(asked: Asked) -> bool:
-    """Whether the steps of a method are cut at impacts, so that each is in one room."""
+    """Whether the steps of a method are cut at impacts, so that each step is in one room."""
     return bool(getattr(asked.method, "adaptive", False))
 
 
@@ -231,7 +231,7 @@ def _period(asked: Asked) -> Found:
 
 
 def _cuts_at_impacts(asked: Asked) -> str | None:
-    """The argument of `AugmentedLagrangian` that cuts its steps at impacts with walls at rest; None without it."""
+    """Return the argument of `AugmentedLagrangian` that cuts its steps at impacts on walls at rest, or None."""
     if _takes_rooms(asked):
         return "adaptive = True"
     return 'on_unconverged = "impact"' if getattr(asked.method, "on_unconverged", "") == "impact" else None
@@ -283,13 +283,13 @@ def _measured_in_part(asked: Asked) -> Found:
 
 
 class Refusal(NamedTuple):
-    """The error of an engine for what it does not support: the problem, and what to use instead."""
+    """The error of an engine for a capability that it does not support: the problem, and the remedy."""
 
     problem: str
     remedy: str
 
     def sentence(self) -> str:
-        """The sentence of the error, with its fields in braces."""
+        """Return the sentence of the error, with its fields in braces."""
         return f"{self.problem}; {self.remedy}"
 
 
@@ -323,7 +323,7 @@ _WAITS_FOR_A_MASS = Refusal(
 
 
 def _with_method(name: str, without: str, got: str = "got") -> Refusal:
-    """The error for a property of a wall that a method of fixed steps does not support."""
+    """Return the error for a property of a wall that a method of fixed steps does not support."""
     return Refusal(f"surfaces[{{i}}].{name} must be {without} with {{method}}, got {{{got}}}", "use Impact")
 
 
@@ -348,15 +348,15 @@ def _listed(what: str, remedy: str) -> Refusal:
 
 
 class Capability(NamedTuple):
-    """Something that a run may ask for.
+    """A property that a run may have.
 
     Attributes:
-        name: its name, which the table of the guide shows.
-        found: yields the places where a run asks for it.
+        name: its name in the table of the guide.
+        found: a function that yields the places where a run needs it.
         refused: engines that do not support it -> the error. The fields in braces are those of `found`, the `kind` (the
             class) of its `got`, the name of the `method`, the `whole` method, and its `contact_step` as `step`.
-        is_argument: whether it is about an argument of a method; then it is no row of the table.
-        within: the name of the capability that this is a special case of, or "".
+        is_argument: whether it is about an argument of a method, and so no row of the table.
+        within: the name of the capability of which this is a special case, or "".
     """
 
     name: str
@@ -366,11 +366,11 @@ class Capability(NamedTuple):
     within: str = ""
 
     def sentence(self, engine: str) -> str | None:
-        """The sentence of the error for an engine, with its fields in braces; None if the engine supports this."""
+        """Return the sentence of the error for an engine, with fields in braces; None if the engine supports this."""
         return next((one.sentence() for engines, one in self.refused.items() if engine in engines), None)
 
 
-# The first that applies is the error of a run.
+# The first refusal that applies is the error of a run.
 CAPABILITIES = (
     Capability("method", _where(lambda asked: True), {
         (OTHER_BODIES,): _NO_METHOD,
@@ -756,7 +756,7 @@ CAPABILITIES = (
 
 
 def sentence(engine: str, capability: str) -> str | None:
-    """The sentence of the error for an engine and the name of a capability; None if the engine supports it.
+    """Return the sentence of the error for an engine and the name of a capability; None if the engine supports it.
 
     >>> sentence(POINTS, "source") is None
     True
@@ -775,7 +775,7 @@ _REFUSED = {
 
 
 def require_supported(asked: Asked) -> None:
-    """Raise a `SceneError` for the first capability that a run asks for and its engine does not support."""
+    """Raise a `SceneError` for the first capability that a run needs and its engine does not support."""
     method = asked.method
     fields = {"method": type(method).__name__, "whole": method, "step": getattr(method, "contact_step", 0.0)}
     for capability, text in _REFUSED[engine_of(asked)]:
@@ -785,7 +785,7 @@ def require_supported(asked: Asked) -> None:
 
 
 def markdown() -> list[str]:
-    """The lines of the table in the guide: whether each engine supports each capability."""
+    """Return the lines of the table in the guide: whether each engine supports each capability."""
     kinds = [engine for engine in ENGINES if engine != BASELINE]
     rows = [("", *kinds), ("---",) * (1 + len(kinds))]
     shown = (one for one in CAPABILITIES if not one.is_argument)

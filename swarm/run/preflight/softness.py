@@ -1,4 +1,4 @@
-"""The depths of soft contacts at the speeds that are known before a run, and the warning where these are too deep."""
+"""The depths of soft contacts at the speeds known before a run, and the warning if they are too deep."""
 
 import logging
 import math
@@ -23,7 +23,7 @@ _DENSEST = 22_590.0
 
 
 def warn_of_depths(task: Task) -> None:
-    """Warn where a particle sinks too deep into a wall, or into another particle."""
+    """Warn if a particle sinks too deep into a wall, or into another particle."""
     method, particles = task.method, task.particles
     if task.bodies is not None or method.law() is None or method.is_rigid() or method.has_multipliers():
         return
@@ -39,10 +39,10 @@ def warn_of_depths(task: Task) -> None:
 
 
 def depths_of(method: Method, mass: Floats, speed: Floats | float, restitution: float = 1.0) -> Floats:
-    """The largest overlaps [m] of contacts that begin at these speeds [m/s], of masses that move alone [kg].
+    """Return the largest overlaps [m] of contacts of single moving masses [kg] that begin at these speeds [m/s].
 
     Without losses the depth d follows from the energy, alpha d^(a + 1)/(a + 1) = m v^2/2. Phi(d) is then the amplitude
-    of an oscillator (`damping_of`); with the part z of critical damping it is smaller by the factor
+    of an oscillator (`damping_of`). With the part z of critical damping it is smaller by the factor
         exp(-z acos(z)/sqrt(1 - z^2)).
     """
     a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
@@ -53,7 +53,7 @@ def depths_of(method: Method, mass: Floats, speed: Floats | float, restitution: 
 
 
 def _turned(z: float) -> float:
-    """z acos(z)/sqrt(1 - z^2), beyond 1 with its hyperbolic functions."""
+    """z acos(z)/sqrt(1 - z^2), continued by hyperbolic functions beyond 1."""
     if abs(z - 1.0) < 1e-9:
         return 1.0
     root = math.sqrt(abs(1.0 - z * z))
@@ -61,10 +61,10 @@ def _turned(z: float) -> float:
 
 
 def _penalty(method: Method, depth: float, allowed: float) -> float:
-    """The penalty with which a contact is as deep as allowed [m], rounded up to two digits."""
+    """Return the penalty with which a contact has the allowed depth [m], rounded up to two digits."""
     a, alpha = float(method.exponent), float(method.penalty)  # type: ignore[attr-defined]
     enough = float(alpha * math.pow(depth / allowed, a + 1.0))
-    # Rounded up, so that the penalty that the sentence names is enough.
+    # The penalty is rounded up, so that the one in the sentence is enough.
     unit = 10.0 ** (math.floor(math.log10(enough)) - 1)
     return math.ceil(enough / unit) * unit
 
@@ -73,7 +73,7 @@ def _penalty(method: Method, depth: float, allowed: float) -> float:
 
 
 def _falls(scene: Scene, position: Floats) -> Floats:
-    """The squares of the speeds that gravity may add to particles at these places [m^2/s^2]."""
+    """Return the squares of the speeds that gravity may give to particles at these places [m^2/s^2]."""
     added = np.zeros(position.shape[1])
     low, high = scene.bounds()
     for axis, pull in enumerate(scene.gravity or ()):
@@ -83,7 +83,7 @@ def _falls(scene: Scene, position: Floats) -> Floats:
 
 
 def pace_of(surface: Surface) -> float:
-    """A bound of the speed of a surface with a motion [m/s]."""
+    """Return a bound of the speed of a surface with a motion [m/s]."""
     if surface.motion is None:
         return 0.0
     if surface.reacts():
@@ -94,15 +94,15 @@ def pace_of(surface: Surface) -> float:
 
 
 def _speeds(scene: Scene, particles: Particles) -> Floats:
-    """The speeds of particles at walls that are known before the run [m/s]: of the start, of a fall, of the walls."""
+    """Return the speeds of particles at walls known before the run [m/s]: of the start, of a fall, of the walls."""
     own = np.sqrt((particles.velocity**2).sum(axis=0) + _falls(scene, particles.position))
     return np.asarray(own + max((pace_of(surface) for surface in scene.surfaces), default=0.0))
 
 
 def depths_at_start(scene: Scene, particles: Particles, method: Method) -> Floats | None:
-    """The largest gaps of soft walls at which particles may start, (N,); None where walls are rigid.
+    """Return the largest gaps of soft walls at which particles may start, (N,); None for rigid walls.
 
-    A particle at the end of a run may be in a contact: as deep as one that begins at twice the fastest speed.
+    A particle at the end of a run may be in a contact. The limit is the depth of a contact at twice the fastest speed.
     """
     if method.law() is None or method.is_rigid() or method.has_multipliers() or not len(particles):
         return None
@@ -126,7 +126,7 @@ def _warn_of_walls(scene: Scene, particles: Particles, radius: Floats, method: M
 
 
 def _warn_of_pairs(scene: Scene, particles: Particles, radius: Floats, method: Method) -> None:
-    """Warn of the ball that sinks deepest into the fastest one, as a part of the smaller radius."""
+    """Warn of the ball that sinks deepest into the fastest ball, as a part of the smaller radius."""
     fastest = int(np.nanargmax((particles.velocity**2).sum(axis=0)))
     speeds = np.sqrt(((particles.velocity - particles.velocity[:, [fastest]]) ** 2).sum(axis=0))
     mass = particles.mass * particles.mass[fastest] / (particles.mass + particles.mass[fastest])
@@ -138,7 +138,7 @@ def _warn_of_pairs(scene: Scene, particles: Particles, radius: Floats, method: M
 
 
 def _too_dense(scene: Scene, particles: Particles, radius: Floats, k: int) -> str:
-    """What to add where the mass of a ball is likely to be the one that it has by default; else ""."""
+    """Return the text to add if the mass of a ball is likely to be the default; else ""."""
     density = float(particles.mass[k]) / (4.0 / 3.0 * math.pi * float(radius[k]) ** 3)
     if scene.across() is not None or density <= _DENSEST:
         return ""
@@ -159,7 +159,7 @@ def _warn(method: Method, subject: str, what: str, depth: float, radius: float, 
 
 
 def _warn_of_solids(task: Task) -> None:
-    """Warn of a point that sinks deep into a solid, which it leaves on the other side from the middle on."""
+    """Warn of a point that sinks deep into a solid, beyond the middle of which it leaves on the other side."""
     scene, particles, method = task.scene, task.particles, task.method
     solids = [(i, one) for i, one in enumerate(scene.surfaces) if one.is_solid() and math.isfinite(one.size())]
     if not solids or not len(particles):
@@ -167,7 +167,7 @@ def _warn_of_solids(task: Task) -> None:
     i, thinnest = min(solids, key=lambda one: one[1].size())
     speeds = _speeds(scene, particles)
     k = int(np.nanargmax(particles.mass * speeds * speeds))
-    # Of phi, which is a length where its slope is 1.
+    # The slope of phi, which is a length if its slope is 1.
     slope = float(np.median(np.sqrt((thinnest.gradient(particles.position[:, k : k + 1]) ** 2).sum(axis=0))))
     depth = float(depths_of(method, particles.mass[k], speeds[k])) / slope if slope > 0.0 else 0.0
     thickness = 2.0 * thinnest.size()
@@ -181,11 +181,11 @@ def _warn_of_solids(task: Task) -> None:
         )  # fmt: skip
 
 
-# --- What ended a run -------------------------------------------------------------------------------------
+# --- The end of a run -------------------------------------------------------------------------------------
 
 
 def of_passing(scene: Scene, method: Method, state: State, particle: int, moment: float) -> str:
-    """Of a point that goes through the middle of a wall: the state is that at the start of its step."""
+    """Return the text on a point that goes through the middle of a wall; the state is that at the start of its step."""
     place, velocity, step = state.position[:, particle], state.velocity[:, particle], float(method.dt)  # type: ignore[attr-defined]
     ways = place[:, None] + velocity[:, None] * np.linspace(0.0, step, 9)
     passable = np.array([surface.may_be_passed() for surface in scene.surfaces])
@@ -194,7 +194,7 @@ def of_passing(scene: Scene, method: Method, state: State, particle: int, moment
     surface = scene.surfaces[wall]
     speed = math.hypot(*velocity) + pace_of(surface)
     energy = 0.5 * float(state.mass[particle]) * speed**2 + _stored(method, surface, place[:, None], moment)
-    # What it would store where it is as deep as is small.
+    # The energy that the wall would store at a depth that is small.
     entry, inward = _entry(surface, place, velocity, moment)
     half = surface.size() if surface.is_solid() else float(inward @ (ways[:, 4] - entry))
     allowed = _stored(method, surface, (entry + 2.0 * MOST_PRESSED * half * inward)[:, None], moment)
@@ -209,15 +209,15 @@ def of_passing(scene: Scene, method: Method, state: State, particle: int, moment
 
 
 def _stored(method: Method, surface: Surface, place: Floats, moment: float) -> float:
-    """The energy that a wall stores by a point at this place (3, 1) [J]."""
+    """Return the energy that a wall stores by a point at this place (3, 1) [J]."""
     gap = side_of(surface) * float(surface.phi(place, moment)[0])
     return float(method.law().stored_energy(gap)) if gap > 0.0 else 0.0
 
 
 def _entry(surface: Surface, place: Floats, velocity: Floats, moment: float) -> tuple[Floats, Floats]:
-    """About where a straight way to a place came through the wall, and the unit normal there that leads in."""
+    """Estimate where a straight way to a place came through the wall; return this place and the inward unit normal."""
     side, way = side_of(surface), velocity / math.hypot(*velocity)
-    # From near to far: it may have begun in the wall.
+    # Lengths go from near to far, as the way may have begun in the wall.
     lengths = np.concatenate([[-1.0, 0.0], np.geomspace(1e-4, 10.0, 2000)]) * surface.size()
     back = place[:, None] - lengths * way[:, None]
     outside = side * surface.phi(back, moment) <= 0.0

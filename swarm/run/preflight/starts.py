@@ -1,4 +1,4 @@
-"""Whether particles start inside their walls, and the error about those that do not: where, how far, how to mend it."""
+"""The check that particles start inside their walls, and its error: where, how far outside, how to mend it."""
 
 import math
 
@@ -13,22 +13,23 @@ from ...surfaces.instant import box_of, gaps_of, gradient_of
 from ...surfaces.shapes.plane import Plane
 from ...surfaces.surface import Surface
 
-# Steps along the gradient in which the way to a wall is found; the nudge off a point without one, of the scene's size.
+# The steps along the gradient in which the way to a wall is found; the step from a point without a gradient, as a part
+# of the size of the scene.
 _WAYS, _NUDGE = 60, 1e-3
-# A way that ends this near to the wall, of its length, has come to it.
+# The last step of a way that has come to the wall, as a part of its length.
 _ARRIVED = 1e-6
-# Particles that are looked at for what would mend it.
+# The particles on which a remedy is tried.
 _LOOKED_AT = 1000
 
 Places = NDArray[np.float64]
 
 
 def require_inside(scene: Scene, particles: Particles, depths: Places | None = None) -> None:
-    """Raise a `SceneError` where a particle is outside of a wall by more than round-off, or of a soft one by `depths`.
+    """Raise a `SceneError` if a particle is outside of a wall by more than round-off, or of a soft wall by `depths`.
 
     `depths` are the largest gaps, (N,).
     """
-    # Their magnitude sets the round-off of a position on a wall.
+    # The magnitude of positions sets the round-off of a position on a wall.
     magnitude = max(float(particles.position.max()), -float(particles.position.min()), scene.finite_size())
     outside = scene.outside(particles.position, START_ON_WALL * magnitude)
     if outside.size and depths is not None:
@@ -38,16 +39,16 @@ def require_inside(scene: Scene, particles: Particles, depths: Places | None = N
 
 
 def error_of(scene: Scene, particles: Particles, outside: NDArray[np.intp], distances: Places) -> SceneError:
-    """The error about particles, the numbers of those outside and their distances outside of every surface.
+    """Return the error about particles outside of their walls.
 
     Args:
         scene: the walls.
-        particles: all at the start.
-        outside: the numbers of those that are outside.
-        distances: how far these are outside of every surface, (surfaces, those) [m].
+        particles: all particles at the start.
+        outside: the numbers of the particles outside, (K,).
+        distances: how far these are outside of every surface, (surfaces, K) [m].
     """
     position = particles.position
-    # Where phi is not a number a particle is outside.
+    # A particle at which phi is NaN is outside.
     walls = np.argmax(np.where(np.isnan(distances), np.inf, distances), axis=0)
     first, wall = int(outside[0]), int(walls[0])
     met, counts = np.unique(walls, return_counts=True)
@@ -76,7 +77,7 @@ def _named(scene: Scene, wall: int) -> str:
 
 
 def _how_far(scene: Scene, wall: int, place: Places) -> str:
-    """How far a point is on the wrong side, in words."""
+    """Return how far a point is on the wrong side, in words."""
     surface = scene.surfaces[wall]
     side = surface.beyond()
     distance = _distance(scene, wall, place)
@@ -84,7 +85,7 @@ def _how_far(scene: Scene, wall: int, place: Places) -> str:
 
 
 def _distance(scene: Scene, wall: int, place: Places) -> float:
-    """About how far a point is from a wall, along the gradient [m]; NaN where no way leads there."""
+    """Estimate the distance of a point from a wall along the gradient [m]; NaN if no way leads there."""
     first = abs(float(scene.distances_outside(place)[wall, 0]))
     first = first if first < scene.extent() else math.nan
     if scene.period is not None:
@@ -95,7 +96,7 @@ def _distance(scene: Scene, wall: int, place: Places) -> float:
         for _way in range(_WAYS):
             gap, slope = float(gaps_of(images, r, 0.0)[0, 0]), gradient_of(images, r)
             steep = float((slope**2).sum())
-            # The middle of a surface has no way out.
+            # The middle of a surface has no gradient, and so no way out.
             move = -gap / steep * slope if steep > 0.0 else np.array([[0.48], [0.6], [0.64]]) * step
             r = r + move
             gone = float(np.sqrt(((r - place) ** 2).sum()))
@@ -105,7 +106,7 @@ def _distance(scene: Scene, wall: int, place: Places) -> float:
 
 
 def _admissible(surface: Surface, place: Places) -> str:
-    """Which side of a surface is admissible, and what its phi is at a point."""
+    """Return the text on the admissible side of a surface, and its phi at a point."""
     phi = float(surface.phi(place)[0])
     if math.isnan(phi):
         return "its phi is not a number there"
@@ -113,7 +114,7 @@ def _admissible(surface: Surface, place: Places) -> str:
 
 
 def _mend(scene: Scene, wall: int, position: Places, outside: int) -> str:
-    """What would likely mend it, tried on particles: a wall elsewhere, or its other side, else other particles."""
+    """Return the likely remedy, tried on particles: another place or side of the wall, else other particles."""
     surface, total = scene.surfaces[wall], position.shape[1]
     some = position[:, :: max(1, total // _LOOKED_AT)]
     if total > 1 and (center := _center_around(surface, some)) is not None:
@@ -125,7 +126,7 @@ def _mend(scene: Scene, wall: int, position: Places, outside: int) -> str:
 
 
 def _center_around(surface: Surface, position: Places) -> tuple[float, ...] | None:
-    """The centre with which a cavity holds all particles; None if no shift of it does, or it cannot be shifted."""
+    """Return the centre with which a cavity holds all particles; None if no shift does, or no shift is possible."""
     if surface.is_solid() or not hasattr(surface, "center") or surface.motion is not None:
         return None
     box = np.array(box_of(surface, 0.0))
@@ -140,7 +141,7 @@ def _center_around(surface: Surface, position: Places) -> tuple[float, ...] | No
 
 
 def _other_side(scene: Scene, wall: int) -> str | None:
-    """What makes the other side of a surface the admissible one; None where that would leave the scene open."""
+    """Return the text that makes the other side of a surface admissible; None if that would leave the scene open."""
     surface = scene.surfaces[wall]
     if isinstance(surface, Plane):
         normal = tuple(0.0 - x for x in surface.normal)

@@ -17,14 +17,14 @@ from ...particles import Particles
 from ...surfaces.time_of_impact import flights
 
 _LOG = logging.getLogger("swarm")
-# At some 10 ns an impact: minutes a frame, without a sign of progress; and days of a processor.
+# At some 10 ns an impact, the first number takes minutes in one frame, and the second one days of a processor.
 _MOST_A_FRAME, _MANY = 1e10, 1e13
-# Particles with flights that are computed, of which the median counts, and most parts of a fall until its hit is known.
+# The particles with computed flights, of which the median counts, and the most parts of a fall before its hit.
 _PARTICLES, _PARTS = 4, 8
-# Chords of a walk through the volume, and how many of the last of them count.
+# The chords of a walk through the volume, and the number of the last chords that count.
 _CHORDS, _COUNTED = 60, 30
 
-# The speed of light [m/s], and what to say of a higher one, which only another unit can mean, with k_B T at 300 K.
+# The speed of light [m/s], and the text on a higher speed, which only a wrong unit can give, with k_B T at 300 K.
 LIGHT = 299_792_458.0
 BEYOND_LIGHT = (
     "which is above the speed of light: speeds are in m/s, masses in kg, and a temperature is k_B T in J, at 300 K "
@@ -33,7 +33,7 @@ BEYOND_LIGHT = (
 
 
 class Flights(NamedTuple):
-    """Typical time from impact to impact [s], and the wall that is hit most often."""
+    """The typical time from impact to impact [s], and the wall that is hit most often."""
 
     between: float
     wall: int
@@ -42,12 +42,12 @@ class Flights(NamedTuple):
 def require_few_impacts(
     compiled: CompiledScene, particles: Particles, method: Method, until: float, every: float
 ) -> None:
-    """Raise a `SceneError` where a frame would take more impacts of one particle than it can; warn of a long run."""
+    """Raise a `SceneError` if a particle would have too many impacts in a frame; warn of a long run."""
     impact = method.time_of_impact()
-    # Where energy is lost or given, by heat or by work, the first flights say nothing of the later ones.
+    # If energy is lost, or given by heat or work, the first flights say nothing about later flights.
     if impact is None or compiled.laws is not None:
         return
-    # A flight of this time [s], and longer ones, give few impacts.
+    # Flights of at least this time [s] give few impacts.
     enough = max(every / _MOST_A_FRAME, len(particles) * until / _MANY)
     with np.errstate(all="ignore"):
         if _are_long(compiled, particles, impact, enough):
@@ -55,7 +55,7 @@ def require_few_impacts(
         found = _of_particles(compiled, particles, impact)
         if found.between >= enough:
             return
-        # They may start in a narrow corner and leave it: then the volume around decides.
+        # Particles may start in a narrow corner and leave it. The volume around it then decides.
         found = max(found, _of_volume(compiled, particles, impact))
     if every > _MOST_A_FRAME * found.between:
         i, fastest = int(compiled.numbering.members[0, found.wall]), particles.fastest()
@@ -75,13 +75,13 @@ def require_few_impacts(
 
 
 def time_between(compiled: CompiledScene, particles: Particles) -> float:
-    """The typical time of a flight from impact to impact at the start [s]."""
+    """Return the typical time of a flight from impact to impact at the start [s]."""
     with np.errstate(all="ignore"):
         return _of_particles(compiled, particles, 0.0).between
 
 
 def _are_long(compiled: CompiledScene, particles: Particles, impact: float, enough: float) -> bool:
-    """Whether half of the particles, and so their median, need at least `enough` seconds to the first hit alone."""
+    """Whether half of the particles, and so their median, need at least `enough` seconds to the first hit."""
     walls, pull, chosen, long = compiled.walls(), compiled.scene.pull(), _chosen(particles), 0
     for i in chosen:
         until, _wall = _hit(walls, pull, particles.position[:, i], particles.velocity[:, i])
@@ -92,22 +92,22 @@ def _are_long(compiled: CompiledScene, particles: Particles, impact: float, enou
 
 
 def _of_particles(compiled: CompiledScene, particles: Particles, impact: float) -> Flights:
-    """From the flights of some particles at the start, from the impact before it to the one after it."""
+    """Return the `Flights` of some particles at the start, each from the impact before to the impact after."""
     walls, pull, seen = compiled.walls(), compiled.scene.pull(), []
     for i in _chosen(particles):
         position, velocity = particles.position[:, i], particles.velocity[:, i]
         until, wall = _hit(walls, pull, position, velocity)
         since, _wall = _hit(walls, pull, position, -velocity)
-        # 0 is a particle that rests, or rolls along its wall.
+        # The time is 0 for a particle that rests, or slides along its wall.
         if since + until > 0.0:
             seen.append(Flights(impact + since + until, wall))
     return _typical(seen)
 
 
 def _of_volume(compiled: CompiledScene, particles: Particles, impact: float) -> Flights:
-    """From the chords of the volume around some particles: a random walk from chord to chord.
+    """Return the `Flights` along chords of the volume around some particles, by a random walk from chord to chord.
 
-    Between two chords it moves along the wall, which leads out of a narrow corner, but not out of a narrow slit.
+    Between two chords the walk moves along the wall, which leads out of a narrow corner, but not out of a narrow slit.
     """
     walls, random, seen = compiled.walls(), np.random.default_rng(0), []
     axes, pull = compiled.scene.axes(), math.hypot(*(compiled.scene.gravity or (0.0,)))
@@ -133,7 +133,7 @@ def _of_volume(compiled: CompiledScene, particles: Particles, impact: float) -> 
 
 
 def _chord(walls: Any, point: NDArray[np.float64], way: NDArray[np.float64]) -> tuple[float, float, int]:
-    """The chord through a point, in units of the vector along it: its length, the part ahead, and the wall there."""
+    """Return the length of the chord through a point in units of `way`, the part ahead, and the wall at its end."""
     (ahead, wall), (behind, _wall) = _hit(walls, None, point, way), _hit(walls, None, point, -way)
     return ahead + behind, ahead, wall
 
@@ -145,7 +145,7 @@ def _chosen(particles: Particles) -> list[int]:
 def _hit(
     walls: Any, pull: Gravity | None, position: NDArray[np.float64], velocity: NDArray[np.float64]
 ) -> tuple[float, int]:
-    """The time to the first hit and its wall, infinite if it is not found in a few parts."""
+    """Return the time to the first hit and its wall; infinite if no hit is found in a few parts."""
     total = 0.0
     gravity = np.zeros(3) if pull is None else np.array(pull)
     for _part in range(_PARTS):
@@ -159,7 +159,7 @@ def _hit(
 
 
 def _typical(seen: list[Flights]) -> Flights:
-    """Their median, and the wall of most of them."""
+    """Return the median of flights, and the wall of most of them."""
     if not seen:
         return Flights(math.inf, -1)
     between = sorted(one.between for one in seen)[len(seen) // 2]
