@@ -1,8 +1,9 @@
-"""Safe steps to a wall with a level that is known near each place of a flight, and what follows from them.
+"""Safe steps to a wall with a level that is known near each place of a flight.
 
-Where the level along a whole flight is no quartic, or one of which round-off leaves nothing, it is asked for anew at
-the end of each step: a polynomial of the time from there that is nowhere below it. A step ends where a parabola above
-that rises through 0, so no root is skipped; near the root it is Newton's step of second order.
+They serve where the level along a whole flight is no quartic, or one that round-off spoils. Each step asks for a new
+bound of the level: a polynomial of the time from there that is nowhere below it. A step ends where a parabola above
+this polynomial rises through 0, so no root is skipped; near the root it is Newton's step of second order.
+order.
 """
 
 import math
@@ -16,10 +17,10 @@ from .course import Majorant, positive, rise_by, under_way
 
 
 class LevelBound(Majorant):
-    """The level from one place of a flight on, nowhere above c + 2 b t + a2 t^2 + a3 t^3 + ...
+    """A bound of the level from one place of a flight on: c + 2 b t + a2 t^2 + a3 t^3 + ...
 
-    The window is a time for which that says something. A step that leaves no more than `nearly` of the level is the
-    last, unless to rise through 0 is not yet to meet the wall.
+    The bound is useful for the time `window`. A step that leaves no more than `nearly` of the level is the last, unless
+    `meets` is False: the level may rise through 0 there without a hit.
     """
 
     c: Any
@@ -32,9 +33,9 @@ class LevelBound(Majorant):
     border: Any = None  # None or `Border`
 
     def bounds(self, reach):
-        """(the level with the a2 of a step as far as its reach, s, m).
+        """Return (the level with the a2 of a step up to its reach, s, m).
 
-        Up to there the terms from t^3 on are at most s t^3, beyond a border with a2, and of a magnitude of at most
+        Up to the reach the terms from t^3 on, and beyond a border a2, are at most s t^3, and their magnitude is at most
         m t^3.
         """
         # The reach is infinite only where the level is a parabola.
@@ -49,20 +50,20 @@ class LevelBound(Majorant):
         return above, rise, size + beyond / select(t > 0.0, t, math.inf)
 
     def step(self, time, reach, size):
-        """(the step, its length or 0 if it is the last)."""
+        """Return (the step, its length or 0 if it is the last)."""
         step = select(time < reach, time, reach)
         # A step that only ends at its reach is no hit, however short.
         last = self.meets & (time <= reach) & (rise_by(size, reach) * step * step <= self.nearly)
         return step, select(last, 0.0, step)
 
     def first_step(self):
-        """The first step of a flight: (t, its length, 0 if it is the last)."""
+        """Return the first step of a flight: (t, its length or 0 if it is the last)."""
         above, rise, size = self.bounds(self.window)
         return self.step(above.rises_after_leaving(rise, self.window), self.window, size)
 
 
 class Border(Record):
-    """A border, beyond which a level may differ by (speed t + bent t^2 - margin)^2; `rises`: be higher by that."""
+    """A border, beyond which a level may differ by (speed t + bent t^2 - margin)^2; `rises`: it may be higher."""
 
     speed: Any
     bent: Any
@@ -70,20 +71,20 @@ class Border(Record):
     rises: Any
 
     def beyond(self, t):
-        """s with (speed t + bent t^2 - margin)^2 <= s t^2 from 0 to t, 0 before the border."""
+        """Return s with (speed t + bent t^2 - margin)^2 <= s t^2 from 0 to t; 0 before the border."""
         over = positive(self.speed + t * self.bent - self.margin / select(t > 0.0, t, math.inf))
         return select(t > 0.0, over * over, 0.0)
 
 
 class Approach(Record):
-    """The steps of a flight to a wall that is asked for its level, `near`, at each."""
+    """The steps of a flight to a wall that gives a bound of its level, `near`, at each step."""
 
     surface: Any
     gravity: Any
     r: Vec
     v: Vec
 
-    # What is not found by then goes on in the next pass.
+    # A flight that needs more steps continues in the next pass.
     most = 100
 
     def first_step(self):
@@ -91,15 +92,15 @@ class Approach(Record):
 
     def next_step(self, t, last):
         goes_on = under_way(t, last)
-        # Where there are no more steps, that from the start counts for nothing.
+        # Where there are no more steps, the result of the step from the start is not used.
         s = select(goes_on, t, 0.0)
         place, velocity = self.r + displacement(self.gravity, self.v, s), accelerated(self.gravity, self.v, s)
         step, length = self.step_from(place, velocity, last)
         return select(goes_on, t + step, t), select(goes_on, length, last)
 
     def step_from(self, p, w, last):
-        """(the step from a place with a velocity, its length or 0 if it is the last)."""
-        # The parabola holds for twice the last step, or without end where the level is one itself.
+        """Return (the step from a place with a velocity, its length or 0 if it is the last)."""
+        # The parabola holds for twice the last step, or without end where the level itself is a parabola.
         level = self.surface.near(self.gravity, p, w)
         reach = select(level.window < math.inf, 2.0 * last, math.inf)
         above, rise, size = level.bounds(reach)
@@ -107,7 +108,7 @@ class Approach(Record):
 
 
 class AimedApproach(Approach):
-    """The same to a wall with a `fall`, a `PolynomialFall`: its first root is guessed."""
+    """The steps of a flight to a wall with a `fall`, a `PolynomialFall`: its first root is guessed."""
 
     def first_step(self):
         time, open_ = self.surface.fall(self.gravity, self.r, self.v).aims(math.inf)
@@ -115,5 +116,5 @@ class AimedApproach(Approach):
         return select(open_ > 0.0, first, time), select(open_ > 0.0, length, 0.0)
 
     def first_safe_step(self):
-        """The first step where no guess has led to the root."""
+        """Return the first step where no guess has led to the root."""
         return Approach.first_step(self)

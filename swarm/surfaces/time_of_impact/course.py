@@ -1,8 +1,8 @@
 """The level along a flight as a polynomial of time, and when it first rises through 0.
 
 A straight flight makes the level of a quadric a parabola; its root is a closed form. A fall makes it a quartic; its
-first root is found by safe steps: none is skipped, however close to a double one. Steps have two methods: `first_step`
-and `next_step`, which take a flight from the time that the steps so far have led to by a length on, 0 if it is there.
+first root is found by safe steps: none is skipped, however close to a double one. Steps have two methods, `first_step`
+and `next_step`. Each moves a flight on from the time reached so far and returns a length, 0 at the root.
 """
 
 import math
@@ -19,7 +19,7 @@ from ...kernel.vector import cross, dot, square
 # Safe steps of a falling flight that all lanes take, and how many more one may take in the same pass.
 SAFE_STEPS = 5
 MORE_STEPS = 16
-# A safe step is the last where the parabola is above the level by no more than this part of what a crossing rises.
+# A safe step is the last where the parabola is above the level by at most this part of the rise of a crossing.
 _CLOSE = 1e-16
 # A fall at a solid from more than this many of its sizes away ends where it has come this many times nearer: the
 # round-off of the level's coefficients is that of the distance, so they are computed anew from there. (To end every
@@ -30,7 +30,7 @@ _NO_HIT = TINY
 
 
 class Majorant(Record):
-    """A level from one time of a flight on, c + 2 b t + a2 t^2 + ..., with a rest of at most s t^3 up to a time."""
+    """A level from one time of a flight on: c + 2 b t + a2 t^2 + ..., with a rest of at most s t^3 up to a time."""
 
     if TYPE_CHECKING:
         c: Any
@@ -38,7 +38,7 @@ class Majorant(Record):
         a2: Any
 
     def rises(self, slope, within):
-        """When it rises through 0 at the soonest, with the bound s that holds for so long."""
+        """Return the soonest time when the level rises through 0, where the bound s (`slope`) holds up to `within`."""
         return rise_time(self.c, self.b, self.a2 + rise_by(slope, within))
 
     def leaves(self, slope):
@@ -46,7 +46,7 @@ class Majorant(Record):
         return rise_time(2.0 * self.b, 0.5 * self.a2, slope)
 
     def rises_after_leaving(self, slope, within):
-        """The later of both, where it does not rise at once."""
+        """Return the later time of `rises` and `leaves`, where the level does not rise at once."""
         time, leaving = self.rises(slope, within), self.leaves(slope)
         return select((self.b <= 0.0) & (leaving > time), leaving, time)
 
@@ -54,7 +54,7 @@ class Majorant(Record):
 class Quartic(Majorant):
     """The level of a fall, c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4, and the time in which it crosses the surface's size.
 
-    The window is infinite where the level is a parabola; from afar both are as `level_and_window` says.
+    The window is infinite where the level is a parabola; from afar see `level_and_window`.
     """
 
     c: float
@@ -69,7 +69,7 @@ class Quartic(Majorant):
         return positive(self.a3 + select(self.a4 > 0.0, self.a4 * within, 0.0))
 
     def moved(self, t):
-        """The level from a later time on, by Horner's scheme of what Horner's scheme leaves."""
+        """Return the level from a later time on: Horner's scheme, applied again to its quotients."""
         a4 = self.a4
         a3t = self.a3 + t * a4
         a2t = self.a2 + t * a3t
@@ -84,11 +84,11 @@ class Quartic(Majorant):
         return Quartic(ct, bt, a2t, a3t, a4, self.window)
 
     def first_step(self):
-        """The first step of a flight that does not rise at once: (t, what `Fall.next_step` takes as the last length).
+        """Return the first step of a flight that does not rise at once: (t, the last length for `Fall.next_step`).
 
         Where c <= 0 and b <= 0 the level is below t (2 b + a2 t + s t^2), one power of t nearer to it than the parabola
-        of a safe step: a flight from the wall has c = 0. It is a fifth of the steps, and what a particle at rest under
-        a ceiling needs: the parabola of the whole window rises at once there.
+        of a safe step: a flight from the wall has c = 0. This saves a fifth of the steps. A particle at rest under a
+        ceiling needs it: the parabola of the whole window rises at once there.
         """
         window = abs(self.window)
         time = self.leaves(self.steepest(window))
@@ -97,7 +97,7 @@ class Quartic(Majorant):
 
 
 def ball_rise_time(side, radius2, d, v):
-    """`rise_time` for |d + v t|^2 - R^2, from however far."""
+    """`rise_time` for |d + v t|^2 - R^2, also from afar."""
     c, b, a = square(d) - radius2, dot(d, v), square(v)
     # b^2 - a c = R^2 |v|^2 - |d x v|^2, Lagrange's identity; near the wall the first form is the better one.
     from_afar = radius2 * a - square(cross(d, v))
@@ -105,9 +105,9 @@ def ball_rise_time(side, radius2, d, v):
 
 
 def level_and_window(c, own, size, speed2, pull2):
-    """(c, window) of a fall's course by its level, the level's sizes on the surface and here, square speed and pull.
+    """Return (c, window) of a fall from its level, the level's sizes on the surface and here, square speed and pull.
 
-    The window is a time in which the fall crosses the surface; from outside, the way there and what is beyond it. From
+    The window is a time in which the fall crosses the surface; from outside, the way there and the way across. From
     afar c is that of a level set around the surface and the window is negative: to rise through it is no hit.
     """
     far = abs(c) > _FAR * _FAR * own
@@ -116,16 +116,16 @@ def level_and_window(c, own, size, speed2, pull2):
 
 
 def safe_rise_time(level):
-    """A time up to |window| during which a level surely stays <= 0."""
+    """Return a time up to |window| during which a level surely stays <= 0."""
     window = abs(level.window)
     time = level.rises(level.steepest(window), window)
     return select(level.c > 0.0, 0.0, select(time < window, time, window))
 
 
 def rise_near(level):
-    """(a time up to |window| during which a level surely stays <= 0, whether it rises then), near to its first rise.
+    """Return (a time up to |window| while a level surely stays <= 0, whether it rises then), near its first rise.
 
-    The parabola of twice the time that the one of the window gives is less far above the level.
+    The parabola that holds for twice the time of the first one is less far above the level.
     """
     window = abs(level.window)
     first = level.rises(level.steepest(window), window)
@@ -150,7 +150,7 @@ def rise_by(slope, window):
 
 
 def close(window):
-    """The largest reach step^2 of a step that leaves nothing."""
+    """Return the largest reach step^2 of a step that leaves nothing of the level."""
     window = abs(window)
     return _CLOSE * window * window * window
 
@@ -159,8 +159,8 @@ class Fall(Record):
     """The steps of a flight with a level that is known as a whole."""
 
     level: Quartic
-    nearly: float  # what `close` says of the window
-    may_be_far: Any  # whether the level may be one from afar: a constant for the compiler
+    nearly: float  # the bound `close` of the window
+    may_be_far: Any  # whether the level may be that of a flight from afar: a constant for the compiler
 
     most = SAFE_STEPS + MORE_STEPS
 
@@ -168,12 +168,12 @@ class Fall(Record):
         return self.level.first_step()
 
     def next_step(self, t, last):
-        """One step towards the first rise of the level through 0: (t, its length).
+        """Return one step towards the first rise of the level through 0: (t, its length).
 
-        It ends where a parabola that is nowhere below the level rises through 0, so no root is skipped, however close
-        to a double one. The parabola holds for twice the last step: near a root it becomes the level's own Taylor
+        The step ends where a parabola that is nowhere below the level rises through 0, so no root is skipped, however
+        close to a double one. The parabola holds for twice the last step: near a root it becomes the level's own Taylor
         polynomial, and a step leaves the cube of its length. A step that leaves nothing is the last: the length is 0
-        from then on, or next to it with a negative window, that is from afar: no hit, but a place to begin again from.
+        from then on. With a negative window, from afar, it is next to 0: no hit, but a place to begin again from.
         """
         there, window = 0.0, self.level.window
         if self.may_be_far:
@@ -188,12 +188,12 @@ class Fall(Record):
 
 
 def under_way(t, last):
-    """Whether a flight has not met the wall, and may."""
+    """Whether a flight has not met the wall yet, and may still meet it."""
     return (t < math.inf) & (last > 0.0)
 
 
 def first_rise(steps):
-    """(the time that the steps of a flight lead to, whether it meets the wall then or never)."""
+    """Return (the time that the steps of a flight lead to, whether that is final: the hit, or infinite)."""
     t, last = steps.first_step()
     for _step in range(steps.most):
         if not under_way(t, last):

@@ -15,40 +15,40 @@ from .polynomial import ConvexFlight, PolynomialFall, PolynomialFlight
 class Hit(NamedTuple):
     """The time of a hit and the number of the wall.
 
-    The number is -1 where the flight is surely free until that time, and has to be searched further from there.
+    The number is -1 where the flight is surely free until that time, and must be searched further from there.
     """
 
     time: float
     wall: float
 
 
-# Rooms of a union, or cells of a field, that a step is followed through at most.
+# The most rooms of a union, or cells of a field, that a step is followed through.
 _MOST_ROOMS = 1000
 # No hit, ever.
 NEVER = Hit(math.inf, 0.0)
 
 
 def of_flights(falls):
-    """The names of the methods of a wall that free flights need; `falls`: under gravity."""
+    """Return the names of the methods of a wall that free flights need; `falls`: under gravity."""
     return ("falling_hit" if falls else "first_hit",)
 
 
 def of_steps(falls):
-    """The names of those that whole steps need, some of which are skipped by a bound."""
+    """Return the names of the methods that whole steps need, some of which are skipped by a bound."""
     # The loops of a fall are compiled for every method.
     free = ("safe_time", "falling_hit") if falls else ("first_hit",)
     return *free, "inner", "level_of"
 
 
 def hit(gravity, surface, r, v):
-    """When the free flight leaves the admissible side of one wall: (time, whether it does then)."""
+    """Return when the free flight leaves the admissible side of one wall: (time, whether it is a hit)."""
     if gravity is None:
         return surface.first_hit(r, v)
     return surface.falling_hit(r, v, as_vector(gravity))
 
 
 def first_hit(walls, gravity, r, v):
-    """The first `Hit` of a free flight."""
+    """Return the first `Hit` of a free flight."""
     first = NEVER
     for rooms in reversed(walls.joined()):
         hits = tuple(tuple(hit(gravity, wall, r, v) for _number, wall, _gentle in room) for room in rooms)
@@ -64,7 +64,7 @@ def first_hit(walls, gravity, r, v):
 
 
 def union_hit(walls, rooms, hits, gravity, flight, stops=False):
-    """The first `Hit` of a flight (r, v) with a union, from those with the walls of its rooms; `stops` as of `end`."""
+    """Return the first `Hit` of a flight (r, v) with a union, from the hits in its rooms; `stops` as in `end`."""
     leaves: Any = ()
     for room, some in zip(rooms, hits, strict=True):
         first = NEVER
@@ -75,36 +75,36 @@ def union_hit(walls, rooms, hits, gravity, flight, stops=False):
 
 
 def soonest(hit, number, later):
-    """The sooner of two hits: with a field that begins at this number, and with a later wall."""
+    """Return the sooner of two hits: with the field whose first wall has this number, and with a later wall."""
     first = hit.time <= later.time
     wall = select(hit.wall < 0.0, -1.0, hit.wall + number)
     return Hit(select(first, hit.time, later.time), select(first, wall, later.wall))
 
 
 def sooner(time, found, number, later):
-    """The sooner of two hits: with the wall of this number, and with a later wall."""
+    """Return the sooner of two hits: with the wall of this number, and with a later wall."""
     sooner = later.time < time
     return Hit(select(sooner, later.time, time), select(sooner, later.wall, select(found, number, -1.0)))
 
 
 # --- In lanes, by steps ----------------------------------------------------------------------------------
 
-# A flight in lanes: what the safe steps of each wall know, in this many rows a wall.
+# A flight in lanes: the state of the safe steps of each wall, in this number of rows for each wall.
 COURSE = 13
 _WINDOW, _TIME, _LAST, _CLOSE = 5, 6, 7, 8
-# Of a polynomial all but its window
+# Of a polynomial: all its numbers except the window
 _OF_POLYNOMIAL = 0, 1, 2, 3, 4, 5, 8
-# Where a polynomial has no start and end, a guess
+# A guess, where a polynomial has no start and end
 _GUESS = 8
-# Of a fall that begins with a guess all powers
+# Of a fall with a guess: all powers
 _OF_FALL = 0, 1, 2, 3, 4, 9, 10, 11, 12
-# Of a flight that is looked at its constants, and the next look and the last one
+# Of a flight by looks: its constants, and the next look and the last one
 _OF_CONSTANTS = 4, 5, 8
 _OF_LOOKS = 0, 1, 2, 3
 
 
 def begin(walls, gravity, course, row, lane, r, v, aims=False):
-    """The start of a flight for every wall into course[row:, lane]; if it `aims`, without what `turn` to `aimed` do."""
+    """Write the start of a flight to each wall into course[row:, lane]; `aims`: leave the work of `turn` to `aimed`."""
     for k, wall in enumerate(walls.each):
         at = row + k * COURSE
         if aims and gravity is not None and wall.fall_powers > 0:
@@ -131,14 +131,14 @@ def begin(walls, gravity, course, row, lane, r, v, aims=False):
 
 
 def _begin_polynomial(course, at, lane, flight):
-    """The numbers of a polynomial."""
+    """Write the numbers of a polynomial."""
     for i, number in zip(_OF_POLYNOMIAL, flight, strict=False):
         if number is not None:
             course[at + i, lane] = number
 
 
 def _begin_fall(course, at, lane, fall):
-    """The numbers of a fall."""
+    """Write the numbers of a fall."""
     for i, number in zip(_OF_FALL, fall.powers, strict=False):
         course[at + i, lane] = number
     course[at + _WINDOW, lane] = fall.window
@@ -146,21 +146,21 @@ def _begin_fall(course, at, lane, fall):
 
 
 def _begin_guess(course, at, lane, flight):
-    """What a guess of its root begins with."""
+    """Write the start of a guess of the root."""
     course[at + _WINDOW, lane], course[at + _LAST, lane] = flight.window, 0.5 * flight.window
     if isinstance(flight, ConvexFlight):
         course[at + _GUESS, lane] = flight.turn()
 
 
 def _begin_looks(course, at, lane, flight):
-    """The start of a flight that is looked at."""
+    """Write the start of a flight by looks."""
     for i, number in zip(_OF_CONSTANTS, flight.constants(), strict=False):
         course[at + i, lane] = number
     _keep(course, at, lane, flight.first())
 
 
 def _look_on(course, at, lane, flight):
-    """One look more at it, if that is needed."""
+    """Look at the flight once more, if it needs that."""
     constants = tuple(course[at + i, lane] for i in _OF_CONSTANTS[: len(flight.constants())])
     goes_on = course[at + _LAST, lane] > 0.0
     known = Looked(course[at + _TIME, lane], goes_on, *(course[at + i, lane] for i in _OF_LOOKS))
@@ -169,14 +169,14 @@ def _look_on(course, at, lane, flight):
 
 
 def _keep(course, at, lane, known):
-    """What is `Looked` at."""
+    """Write the numbers of `Looked`."""
     for i, number in zip(_OF_LOOKS, (known.at, known.before, known.level, known.half), strict=True):
         course[at + i, lane] = number
     course[at + _TIME, lane], course[at + _LAST, lane] = known.free, select(known.goes_on, 1.0, 0.0)
 
 
 def turn(walls, gravity, course, row, lane):
-    """Where to guess the first hits of a flight from, where that is a chain of operations of its own."""
+    """Put the time from which to guess the first hit with a wall, where that is a chain of operations of its own."""
     for k, wall in enumerate(walls.each):
         level = _level(course, row + k * COURSE, lane, wall, gravity) if _is_aimed(wall, gravity) else None
         if level is not None and not isinstance(level, ConvexFlight):
@@ -184,7 +184,7 @@ def turn(walls, gravity, course, row, lane):
 
 
 def aim(walls, gravity, course, row, lane):
-    """The guesses."""
+    """Guess the first hits."""
     for k, wall in enumerate(walls.each):
         if _is_aimed(wall, gravity):
             at = row + k * COURSE
@@ -192,7 +192,7 @@ def aim(walls, gravity, course, row, lane):
 
 
 def nearer(walls, gravity, course, row, lane):
-    """The guesses nearer to the hits."""
+    """Improve the guesses."""
     for k, wall in enumerate(walls.each):
         if _is_aimed(wall, gravity):
             at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall, gravity)
@@ -201,7 +201,7 @@ def nearer(walls, gravity, course, row, lane):
 
 
 def aimed(walls, gravity, course, row, lane, is_last):
-    """The guesses still nearer; with those that lead to a hit the first step."""
+    """Improve the guesses again; a guess that leads to a hit is the first step."""
     for k, wall in enumerate(walls.each):
         if _is_aimed(wall, gravity):
             at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall, gravity)
@@ -211,7 +211,7 @@ def aimed(walls, gravity, course, row, lane, is_last):
 
 
 def step_off(walls, gravity, course, row, lane, r, v):
-    """The first safe steps of a fall to walls of which no guess has led to the hit."""
+    """Take the first safe step of a fall to each wall whose hit no guess has led to."""
     for k, wall in enumerate(walls.each):
         if _is_aimed(wall, gravity):
             at = row + k * COURSE
@@ -221,7 +221,7 @@ def step_off(walls, gravity, course, row, lane, r, v):
 
 
 def leave_free(walls, gravity, course, row, lane, remaining):
-    """No more guesses with walls that the flight surely does not meet in this frame."""
+    """Stop guessing for walls that the flight surely does not meet in this frame."""
     for k, wall in enumerate(walls.each):
         if _is_aimed(wall, gravity):
             at, level = row + k * COURSE, _level(course, row + k * COURSE, lane, wall, gravity)
@@ -232,12 +232,12 @@ def leave_free(walls, gravity, course, row, lane, remaining):
 
 
 def _is_aimed(wall, gravity):
-    """Whether a hit with a wall is guessed."""
+    """Whether the hit with a wall is guessed."""
     return wall.aims if gravity is None else wall.fall_powers > 0
 
 
 def _level(course, at, lane, wall, gravity):
-    """The `PolynomialFlight`, or `PolynomialFall`, to a wall."""
+    """Return the `PolynomialFlight`, or `PolynomialFall`, to a wall."""
     if gravity is not None:
         powers = tuple(course[at + i, lane] for i in _OF_FALL[: wall.fall_powers])
         return PolynomialFall(powers, course[at + _WINDOW, lane])
@@ -246,7 +246,7 @@ def _level(course, at, lane, wall, gravity):
 
 
 def step(walls, gravity, course, row, lane, r, v):
-    """One safe step of every wall that needs steps, of the flight that starts at r."""
+    """Take one safe step to every wall that needs steps, of the flight that starts at r."""
     for k, wall in enumerate(walls.each):
         at = row + k * COURSE
         if gravity is not None and wall.is_quartic:
@@ -264,9 +264,9 @@ def step(walls, gravity, course, row, lane, r, v):
 
 
 def end(walls, gravity, course, row, lane, flight, stops=False):
-    """`first_hit` from the course of a flight (r, v); if it `stops` with none that goes on in another room."""
+    """Return `first_hit` from the course of a flight (r, v); with `stops` no flight continues in another room."""
     first, k = NEVER, len(walls.shared())
-    # A flight that stops is only asked whether it needs more steps.
+    # A flight that stops is used only to learn whether it needs more steps.
     asked = None if stops else flight
     for rooms in walls.joined():
         hits: Any = ()
@@ -284,7 +284,7 @@ def end(walls, gravity, course, row, lane, flight, stops=False):
 
 
 def _known(wall, gravity, course, row, k, lane, flight):
-    """What the course knows of the hit of a flight, or None, with wall k: (time, whether it is one)."""
+    """Return the hit with wall k that the course holds: (time, whether it is a hit); `flight` (r, v) refines it."""
     at = row + k * COURSE
     time, found = course[at + _TIME, lane], course[at + _LAST, lane] == 0.0
     if flight is not None and (wall.kept > 0 if gravity is None else wall.fall_powers > 0):
@@ -296,7 +296,7 @@ def _known(wall, gravity, course, row, k, lane, flight):
 
 
 def hit_of(walls, gravity, wall, r, v):
-    """`hit` of the wall with this number."""
+    """Return `hit` of the wall with this number."""
     return walls.of(wall, (math.inf, True), _hit_of, gravity, r, v)
 
 
@@ -305,9 +305,9 @@ def _hit_of(surface, gravity, r, v):
 
 
 def other_hit(walls, wall, r, v, until=math.inf):
-    """The first hit of a straight flight that lasts so long with any wall but this one; -1: with any wall.
+    """Return the first hit of a straight flight up to `until` with any wall except this one; -1: with any wall.
 
-    In a union that is with the walls of the same room: what goes over into another one is met here.
+    In a union it is a hit with the walls of the same room, even where the flight passes into another room there.
     """
     first = NEVER
     for rooms in reversed(walls.joined()):
@@ -331,14 +331,14 @@ def other_hit(walls, wall, r, v, until=math.inf):
 
 
 def _unless(first, skip, hit):
-    """The sooner one of two hits, the `first` one if the other is to be skipped."""
+    """Return the sooner hit, but the `first` one where the other is to be skipped."""
     use = (first.time < hit.time) | skip
     return Hit(select(use, first.time, hit.time), select(use, first.wall, hit.wall))
 
 
 @outlined
 def union_end(walls, rooms, r, v, until):
-    """The `Hit` where a straight flight that lasts so long leaves a union; the wall is -1 where it is free so far."""
+    """Return the `Hit` where a straight flight leaves a union; the wall is -1 if it stays inside up to `until`."""
     t = 0.0
     for _room in range(_MOST_ROOMS):
         place = r + t * v
@@ -351,7 +351,7 @@ def union_end(walls, rooms, r, v, until):
 
 
 def is_free(walls, r, v, until):
-    """Whether a straight flight meets no wall for so long."""
+    """Whether a straight flight meets no wall up to `until`."""
     if len(walls.fields()) > 0 or len(walls.unions) > 0:
         return other_hit(walls, -1.0, r, v, until).time > until
     return first_hit(walls, None, r, v).time > until
@@ -361,14 +361,14 @@ def is_free(walls, r, v, until):
 
 
 def free_time(gravity, walls, r, v):
-    """A time during which the flight surely stays admissible; 0 for a particle that is in contact now."""
+    """Return a time during which the flight surely stays admissible; 0 for a particle that is in contact now."""
     if gravity is None:
         return select(walls.outside(-1.0, r), 0.0, first_hit(walls, gravity, r, v).time)
     return safe_time(walls, r, v, as_vector(gravity))
 
 
 def safe_time(walls, r, v, pull):
-    """The smallest safe time of all walls."""
+    """Return the smallest safe time of all walls."""
     shortest = math.inf
     for wall in reversed(walls.each):
         time = wall.safe_time(r, v, pull)

@@ -1,6 +1,6 @@
-"""First hits of flights with a wall that has bounds of half its level's second derivatives, the same everywhere.
+"""First hits with a wall whose level has bounds of half its second derivatives that hold everywhere.
 
-Lanes look together; a flight of its own ends its looks when it can.
+Lanes look together; a single flight ends its looks when it can.
 """
 
 import math
@@ -15,19 +15,19 @@ from .march import LOOKS
 
 
 class Looked(Record):
-    """What looks at a flight have found of its first hit so far."""
+    """The state of the search for the first hit of a flight after its last look."""
 
-    free: Any  # a time until which it surely meets nothing; that of the hit once there are no more looks
+    free: Any  # a time until which it surely meets nothing; the time of the hit once there are no more looks
     goes_on: Any  # whether there is a next look
-    at: Any  # its time
-    # The time of the last look, that of the next one before the first, and what it has found
+    at: Any  # the time of the next look
+    # The time of the last look (before the first look that of the next one), the level there and half its derivative
     before: Any
     level: Any
     half: Any
 
 
 class LevelSeen(Record):
-    """What one look sees: the level, half its derivative, and bounds of half its second derivative up to `until`."""
+    """The result of a look: the level, half its derivative, and bounds of half its second derivative up to `until`."""
 
     place: Vec
     speed: Any
@@ -36,35 +36,35 @@ class LevelSeen(Record):
     least: Any
     most: Any
     until: Any
-    # Whether the lowest parabola that the bounds allow, if it rises through 0, does so before `until`
+    # Whether the lowest parabola that the bounds allow rises through 0, if at all, before `until`
     rises: Any
     # Whether round-off decides if the flight, which leaves the wall, has left it
     lets_go: Any
-    ends: Any  # whether a flight that is free until then is so for ever
-    meets: Any = True  # whether it is the wall that the level rises at
+    ends: Any  # whether a flight that is free until `until` is free for ever
+    meets: Any = True  # whether the level that rises is that of the wall
 
 
 class FlightByLooks(Record):
-    """A flight that is looked at.
+    """A flight that is searched by looks.
 
     A safe step ends where the highest parabola that the bounds allow rises through 0. Where even the lowest one does,
-    the level rises all the way from the first root to there: it has no other root, and nothing is left to be proven.
-    Looks then go to the root from both sides, by the cubic through the last two of them.
+    the level rises all the way from the first root to there: it has no other root, and the root is proven to be the
+    first. Looks then approach the root from both sides, by the cubic through the last two of them.
     """
 
     def first(self):
-        """What is known before the first look."""
+        """Return the `Looked` before the first look."""
         raise NotImplementedError
 
     def see(self, known):
-        """The `LevelSeen` of the next look."""
+        """Return the `LevelSeen` of the next look."""
         raise NotImplementedError
 
     def look(self, known):
-        """What is known after one look more."""
+        """Return the `Looked` after the next look."""
         here, t, is_first = self.see(known), known.at, known.at == known.before
         level, half, least, most = here.level, here.half, here.least, here.most
-        # Past the root, or past the wall by round-off or because the surface bends more than was said
+        # Past the root; or past the wall, by round-off or because the surface bends more than its bounds allow
         past = (level > 0.0) & (half > 0.0) & (not is_first)
         # Whether the lowest parabola rises through 0
         one_root = ((half > 0.0) | (least > 0.0)) & (half * half >= least * level) & here.rises
@@ -72,9 +72,9 @@ class FlightByLooks(Record):
         bottom = half + math.sqrt(positive(half * half - bend * level))
         step = select(past, level / select(past, bottom, 1.0), rise_time(level, half, bend))
         beyond = not (t + step <= here.until)
-        # Where there is one root, a look at the end says whether it is before that.
+        # Where there is one root, a look at the end tells whether the root is before the end.
         is_free = here.ends & (not past) & ((beyond & (not one_root)) | (t >= here.until) | (not step < math.inf))
-        # What is left of the level after the step is at most (most - least) step^2, the rise there at least this.
+        # After the step the level is at most (most - least) step^2 below 0, and its slope there at least this.
         way = select(is_free, 0.0, step)
         rising = half + way * select(past, -most, least)
         shortest = 2.0 * EPSILON * (total(absolute(here.place)) / select(here.speed > 0.0, here.speed, 1.0) + way)
@@ -82,7 +82,7 @@ class FlightByLooks(Record):
         arrives &= (way <= shortest) | ((most - least) * way * way <= 2.0 * shortest * rising)
         arrives &= (past | (not beyond)) & (not here.lets_go) & here.meets
         free, after = select(past, known.free, t), select(past, t - way, select(beyond, here.until, t + way))
-        # A level that bends more than was said has its root anywhere between.
+        # A level that bends more than its bounds has its root anywhere between.
         after = select(past & (not after > free), 0.5 * (free + t), after)
         arrives |= past & (not after > free)
         goes_on = (not is_free) & (not arrives)
@@ -90,7 +90,7 @@ class FlightByLooks(Record):
         return Looked(found, goes_on, after, t, level, half)
 
     def _bend(self, known, here, is_first):
-        """Half the second derivative, by the cubic through the last look and this one; at the first the middle."""
+        """Return half the second derivative by the cubic through two looks; at the first the middle of its bounds."""
         since = select(is_first, 1.0, known.at - known.before)
         bend = (3.0 * (known.level - here.level) / since + 2.0 * known.half + 4.0 * here.half) / since
         bend = select(is_first, 0.5 * (here.least + here.most), bend)
@@ -109,11 +109,11 @@ class Straight(FlightByLooks):
     most: Any
 
     def constants(self):
-        """What lanes keep of it."""
+        """Return the numbers of the flight that lanes keep."""
         return self.least, self.most, self.end
 
     def with_constants(self, least, most, end):
-        """The same flight with what lanes keep."""
+        """Return the same flight with the numbers that lanes keep."""
         return self._replace(least=least, most=most, end=end)
 
     def first(self):
@@ -129,13 +129,13 @@ class Straight(FlightByLooks):
 
 
 class FallByLooks(FlightByLooks):
-    """A fall inside a wall of which side H, H = grad grad phi/2, has eigenvalues from `least` to `most` there.
+    """A fall inside a wall where side H, H = grad grad phi/2, has eigenvalues from `least` to `most`.
 
     With w = v + G t, and g the level's part in grad phi.G, half the second derivative of the level after a time s is
         w.H w + g/2 + integral of G.H w,   H between m and M:   |G.(H - c) w| <= (M - m)/2 |G| |w|,   c = (m + M)/2,
-    which is at most M |w|^2 + g/2 + c G.(w s + G s^2/2) + (M - m)/2 |G| |w| s, and at least the same with m for M and
-    the last term below 0. Where a flight only just passes the wall, these tell so little that each look comes nearer by
-    a part of the way. With K >= |third derivative of phi| it is also, from its value now,
+    which is at most M |w|^2 + g/2 + c G.(w s + G s^2/2) + (M - m)/2 |G| |w| s, and at least this with m for M and a
+    last term below 0. Where a flight just passes the wall, these bounds are so wide that each look only comes nearer by
+    a part of the way. With K >= |third derivative of phi| half the second derivative is also, from its value now,
         within s (K |w|^3/2 + 3 max(|m|, |M|) |G| |w|),
     which is less in the end. A sight goes twice as far as the last step.
     """
@@ -149,11 +149,11 @@ class FallByLooks(FlightByLooks):
     window: Any  # the time of the first sight
 
     def constants(self):
-        """What lanes keep of it."""
+        """Return the numbers of the fall that lanes keep."""
         return (self.window,)
 
     def with_constants(self, window):
-        """The same fall with what lanes keep."""
+        """Return the same fall with the numbers that lanes keep."""
         return self._replace(window=window)
 
     def first(self):
@@ -172,7 +172,7 @@ class FallByLooks(FlightByLooks):
         here, room = surface.bent_along(p, w) + bent, self._room(speed + weight * reach, reach)
         least = select(here - room > least, here - room, least)
         most = select(here + room < most, here + room, most)
-        # A fall that slides on leaves the wall where that bends neither towards it nor away, see `march.lets_go`.
+        # A fall that slides along leaves the wall where that bends neither towards it nor away, see `march.lets_go`.
         slack = 2.0 * EPSILON * total(absolute(p)) * norm(n)
         lets_go = (half < 0.0) & (level >= -slack) & (3.0 * half * half <= slack * most)
         level = select(lets_go & (level > -slack), -slack, level)
@@ -180,11 +180,11 @@ class FallByLooks(FlightByLooks):
         return LevelSeen(p, speed + weight * reach, level, half, least, most, t + reach, rises, lets_go, False)
 
     def _within(self, place, speed, reach):
-        """The reach from a place, up to where the bounds hold."""
+        """Return the reach from a place, up to where the bounds hold."""
         return reach
 
     def _bounds(self, speed2, bent, along, speed, reach):
-        """The bounds up to a reach, as the derivative needs them: the level itself has less of the later terms."""
+        """Return the bounds up to a reach for the derivative: for the level itself the later terms are smaller."""
         weight = norm(self.pull)
         middle, apart = 0.5 * (self.most + self.least), 0.5 * (self.most - self.least)
         sideways = apart * weight * (speed + weight * reach)
@@ -196,16 +196,16 @@ class FallByLooks(FlightByLooks):
         return least, most
 
     def _room(self, speed, reach):
-        """How much half the second derivative may be away from its value now, as the derivative needs it."""
+        """Return how far half the second derivative may move from its value now, as the derivative needs it."""
         largest = select(-self.least > self.most, -self.least, self.most)
         pulled = 3.0 * largest * norm(self.pull)
         return 0.5 * reach * speed * (0.5 * self.surface.bends.third * speed * speed + pulled)
 
 
 class FallToBox(FallByLooks):
-    """A fall at a solid in a box, of which the bounds are those within a margin around the box.
+    """A fall at a solid in a box, with bounds that hold within a margin around the box.
 
-    Beyond a face of the box there is no wall: a fall comes to the last of these by a parabola.
+    Beyond a face of the box there is no wall: a fall reaches the last of these faces by a parabola.
     """
 
     def see(self, known):
@@ -229,14 +229,14 @@ class FallToBox(FallByLooks):
 
 
 def falling(surface, pull, r, v):
-    """A fall as looks at it take it."""
+    """Return the fall as its looks take it."""
     size = surface.size
     window = 2.0 * math.sqrt(size * size / (square(v) + size * norm(pull)))
     return surface.falls(surface, r, v, pull, surface.bends.least, surface.bends.most, window)
 
 
 def first_found(flight, looks=LOOKS):
-    """(when a flight meets the wall, whether it does then), by its looks."""
+    """Return (when a flight meets the wall, whether it is a hit), by its looks."""
     known = flight.first()
     for _look in range(looks):
         if not known.goes_on:

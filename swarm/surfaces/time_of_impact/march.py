@@ -1,7 +1,7 @@
 """The first hit of a flight by safe steps: in each the flight surely meets nothing, so no root is skipped.
 
-A *look* at a flight gives the next safe step. Here it follows from `hessian_bounds`, by the root of a parabola above
-the level. Sampled surfaces, surfaces by functions and walls in motion have looks of other kinds.
+A *look* at a flight gives the next safe step. In this file it follows from `hessian_bounds`, by the root of a parabola
+above the level. Sampled surfaces, surfaces by functions and walls in motion have other kinds of looks.
 """
 
 import math
@@ -13,8 +13,8 @@ from ...kernel.record import Record
 from ...kernel.vector import Vec, absolute, dot, norm, square, total
 from .course import rise_time
 
-# The most looks at one flight; near the wall each one doubles the digits. A hit that is not found then is searched in
-# the next pass. The frame may end before a fall meets the wall, so a fall has fewer looks with `hessian_bounds`.
+# The most looks at one flight; near the wall each one doubles the digits. A hit that is not found by then is searched
+# in the next pass. The frame may end before a fall meets the wall, so a fall has fewer looks with `hessian_bounds`.
 LOOKS, FALLING_LOOKS = 200, 16
 # The most bisections of an interval, down to neighbouring floats.
 _BISECTIONS = 1100
@@ -29,11 +29,11 @@ class SafeStep(Record):
     since: Any
     time: Any
     wall: Any = 0.0  # the wall that the flight is at after that time, or -1
-    past: Any = -1.0  # a wall that it has passed at `since` by more than round-off, or -1
+    past: Any = -1.0  # a wall that it has passed at `since`, by more than round-off, or -1
 
 
 class Search(Record):
-    """A flight to search; one to a single wall has the fields `surface`, r, v and `pull`."""
+    """A flight to search; a flight to a single wall has the fields `surface`, r, v and `pull`."""
 
     start, longest, looks = 0.0, math.inf, LOOKS
 
@@ -42,7 +42,7 @@ class Search(Record):
         raise NotImplementedError
 
     def past(self: Any, t):
-        """A wall that the flight has passed at a time, or -1."""
+        """Return a wall that the flight has passed at a time, or -1."""
         surface = self.surface
         level = surface.level_of(surface.inner(self.r + t * (self.v + (0.5 * t) * self.pull)))
         return select(level > 0.0, 0.0, -1.0)
@@ -62,7 +62,7 @@ class ToWall(Search):
 
 
 def first_met(flight):
-    """(time, wall) at which a flight meets a wall; the wall is -1 if it surely meets none until then."""
+    """Return (time, wall) of the first hit of a flight; the wall is -1 if it surely meets none until then."""
     t, before = flight.start, flight.start
     for i in range(flight.looks):
         look = flight.look(t, i == 0)
@@ -73,13 +73,13 @@ def first_met(flight):
         if look.wall >= 0.0:
             return t, look.wall
         if not goes_on:
-            # That the flight never meets a wall is final, as a hit is.
+            # That the flight never meets a wall is final, as a hit would be.
             return flight.longest, select(flight.longest < math.inf, -1.0, 0.0)
     return t, -1.0
 
 
 def bisected(flight, low, high, wall):
-    """(the last time between two at which a flight has passed no wall, the wall that it passes then)."""
+    """Return (the last time between two at which a flight has passed no wall, the wall that it passes then)."""
     for _i in range(_BISECTIONS):
         t = 0.5 * (low + high)
         if not low < t < high:
@@ -97,23 +97,23 @@ def bisected(flight, low, high, wall):
 
 @outlined
 def march(surface, r, v, pull):
-    """`first_hit` of a single wall."""
+    """Return `first_hit` of a single wall."""
     straight = pull.x == 0.0 and pull.y == 0.0 and pull.z == 0.0
     time, wall = first_met(ToWall(surface, r, v, pull, LOOKS if straight else surface.falling_looks))
     return time, wall >= 0.0
 
 
 def safe_time_by_steps(surface, r, v, pull):
-    """A time during which the flight surely stays admissible."""
+    """Return a time during which the flight surely stays admissible."""
     level, _half, step, _way, _steepness = safe_step(surface, r, v, pull, 0.0)
     return select(level > 0.0, 0.0, step)
 
 
 def look(surface, r, v, pull, t, is_first):
-    """The `SafeStep` at a wall."""
+    """Return the `SafeStep` at a wall."""
     p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
     level, half, step, way, steepness = safe_step(surface, p, w, pull, 0.0)
-    # The flight is past the wall by round-off, or because the surface bends more than it was said to.
+    # The flight is past the wall by round-off, or because the surface bends more than its bounds allow.
     is_past = level > 0.0 and half > 0.0 and not is_first
     room = 2.0 * EPSILON * total(absolute(p))
     slack = room * steepness
@@ -128,11 +128,11 @@ def look(surface, r, v, pull, t, is_first):
 
 
 def lets_go(level, half, step, slack):
-    """Whether a flight leaves a wall so slowly that round-off decides its safe step; `slack` is that of the level.
+    """Whether a flight leaves a wall so slowly that round-off decides its safe step; `slack` is the level's round-off.
 
     A particle that slides leaves the wall where that bends neither towards it nor away, and flies along it. The bound
     of the curvature is above 0 there, so the step ends where the particle might be back, after 1e-16 of the way, and
-    so does the next one, without end: the time does not change, or the rounded places drift through the wall. As
+    so do all later ones: the time does not change, or the rounded places drift through the wall. As
     round-off does not distinguish such a place from one on the wall, the step may end that deep outside.
     """
     return (half < 0.0) & (level >= -slack) & (-half * step <= slack)
@@ -140,9 +140,9 @@ def lets_go(level, half, step, slack):
 
 @outlined
 def safe_step(surface, r, v, pull, slack):
-    """(level, half its derivative, a time during which the flight stays admissible, its way at most, |grad q|).
+    """Return (level, half its derivative, a time during which the flight stays admissible, its way at most, |grad q|).
 
-    With a slack the level counts as so much below 0.
+    With a `slack` the level counts as this far below 0.
     """
     n, level, most, magnitude, reach, clear = surface.bent(r)
     side = surface.side
@@ -162,7 +162,7 @@ def safe_step(surface, r, v, pull, slack):
     bound = m0 + select(m1 > 0.0, m1 * reach, 0.0)
     step = min(rise_time(level, half, bound), time_to_travel(speed, g, reach))
     if m1 > 0.0 and (step > 0.0 or m0 < 0.0):
-        # Again with the M of a shorter way: of twice that step, or as far as a fall off the wall surely bends away.
+        # Again with the M of a shorter way: twice that step, or as far as a fall off the wall surely bends away.
         shorter = min(reach, max(2.0 * travelled(speed, g, step), -0.5 * m0 / m1))
         step = max(step, min(rise_time(level, half, m0 + m1 * shorter), time_to_travel(speed, g, shorter)))
     if clear > 0.0:
@@ -171,11 +171,11 @@ def safe_step(surface, r, v, pull, slack):
 
 
 def time_to_travel(speed, g, way):
-    """The time t with speed t + g t^2/2 = way."""
+    """Return the time t with speed t + g t^2/2 = way."""
     twice = speed + (speed if g == 0.0 else math.sqrt(speed * speed + 2.0 * g * way))
     return 2.0 * way / twice if twice > 0.0 else math.inf
 
 
 def travelled(speed, g, t):
-    """How far a flight goes in a time at most."""
+    """Return the longest way of a flight in a time."""
     return (speed + 0.5 * g * t) * t

@@ -1,10 +1,10 @@
 """Safe steps along a straight flight with a level that is a polynomial of time of degree 4 at most.
 
 The coefficients are known once for the whole flight. From the wall inwards the level has a root at 0, which is divided
-out: what is left is a cubic; its first root above 0 is the hit. Steps of Halley's method lead to it from a guess, and
-Bernstein coefficients prove that it is the first. Where they do not, safe steps are taken. The last of those leaves to
-Newton's method what two steps of that make round-off: one by the same coefficients, and one by the level at the place
-of impact, which the hit by Halley's method takes too.
+out. The rest is a cubic; its first root above 0 is the hit. Steps of Halley's method lead to it from a guess, and
+Bernstein coefficients prove that it is the first. Where they do not, safe steps are taken. The last safe step ends
+where two steps of Newton's method leave round-off: one by the same coefficients, and one by the level at the place of
+impact, which also follows Halley's method.
 """
 
 import math
@@ -17,14 +17,14 @@ from .course import Quartic, positive, rise_by, rise_time, under_way
 
 # Steps that all lanes take to a solid.
 POLYNOMIAL_STEPS = 4
-# In place of 0 below a fraction: no power of its inverse that is needed overflows.
+# Replaces 0 below a fraction: no power of its inverse that is needed overflows.
 _TINY = 1e-30
-# From here two steps of Newton's method leave round-off: part of the slope that it changes by on the way to the root.
+# Two steps of Newton's method leave round-off if the slope changes by no more than this part on the way to the root.
 _CONVERGES = 1e-5
-# A guess of the root takes so many times two steps of Halley's method in all; the second of these may change the slope
-# and the time by these parts: the square of one times the other is left, the square of which is round-off.
+# A guess of the root takes this number of times two steps of Halley's method; the second of the two may change the
+# slope and the time by these parts: their product, squared, is left, and the square of that is round-off.
 AIMED, _HALLEY_CONVERGES, _HALLEY_WAY = 3, 1e-3, 1e-2
-# Along a fall a step leads at most so many times the time ahead, and back to no less than this part of it.
+# Along a fall a step leads at most this many times the time ahead, and back to no less than this part of it.
 _AHEAD, _BACK = 2.0, 0.25
 # The root of e x^3 + m x^2 + (1 - 2 m) x = 1 - m is (1 + p e + q e^2)/(1 + (1 + p) e + s e^2), for m of 0 or 1/2 to 9 %
 # up to e = 100.
@@ -32,10 +32,10 @@ _P, _Q, _S = 0.8, 0.01, 0.08
 
 
 def _turn(c, b, a2, a3):
-    """Where a cubic c + b t + a2 t^2 + a3 t^3 turns that is next to its first root above 0, or bends the other way."""
+    """Return the turning point of a cubic c + b t + a2 t^2 + a3 t^3 next to its first root > 0, or its inflection."""
     discriminant = a2 * a2 - 3.0 * a3 * b
     turns, root = discriminant > 0.0, math.sqrt(abs(discriminant))
-    # Where it is highest and lowest, without cancellation. A division takes as long as ten sums.
+    # The times of its maximum and minimum, without cancellation. A division takes as long as ten sums.
     third, bottom = select(a3 == 0.0, _TINY, 3.0 * a3), a2 + select(a2 < 0.0, -root, root)
     both = 1.0 / (third * select(bottom == 0.0, _TINY, bottom))
     over = both * bottom
@@ -46,9 +46,9 @@ def _turn(c, b, a2, a3):
 
 
 def _guess(c, b, a2, a3, turn):
-    """About its first root above 0, where c < 0; anything if it has none."""
+    """Return about the first root above 0 of a cubic with c < 0; any number if it has none."""
     value = c + turn * (b + turn * (a2 + turn * a3))
-    # The parabola from there on, or from there back, or from the start on
+    # The parabola from the turning point on, or from there back, or from the start on
     from_there = (turn > 0.0) & ((value < 0.0) | (b * b < 4.0 * a2 * c) | (a2 * a2 > 3.0 * a3 * b))
     back = from_there & (value >= 0.0)
     sign, t = select(back, -1.0, 1.0), select(from_there, turn, 0.0)
@@ -56,7 +56,7 @@ def _guess(c, b, a2, a3, turn):
     slope = b + t * (2.0 * a2 + 3.0 * t * a3)
     half = sign * (a2 + 3.0 * t * a3)
     rise = math.sqrt(positive(slope * slope - 4.0 * half * value))
-    # Its root over/under, and what the cubic term makes of it, e = more/less
+    # The root of the parabola over/under, and its change by the cubic term, e = more/less
     over, under = -2.0 * value, slope + rise
     more, less = a3 * over * over, rise * under * under
     over = over * (less * less + more * (_P * less + _Q * more))
@@ -77,7 +77,7 @@ def bernstein(powers, t):
 
 
 def _are_below(coefficients):
-    """Whether a level with these Bernstein coefficients is surely below 0, but for its end if that is left out."""
+    """Whether a level with these Bernstein coefficients is surely below 0; without the last, except at the end."""
     below = True
     for one in coefficients:
         below = below & (one < 0.0)
@@ -85,7 +85,7 @@ def _are_below(coefficients):
 
 
 def _are_below_in_halves(coefficients):
-    """The same, but for the end, by the coefficients of each half, de Casteljau's: twice, four, ... times as large."""
+    """Whether the level is below 0 except at the end, by de Casteljau's coefficients of each half, times 2, 4, ..."""
     below, row = coefficients[0] < 0.0, coefficients
     for _one in coefficients[1:]:
         row = tuple(one + other for one, other in zip(row[1:], row[:-1], strict=True))
@@ -94,7 +94,7 @@ def _are_below_in_halves(coefficients):
 
 
 class _HalleyStep(Record):
-    """What is known of a level where a step of Halley's method begins, and how far back the step leads."""
+    """The level where a step of Halley's method begins, and how far back the step leads."""
 
     value: float
     slope: float
@@ -108,31 +108,31 @@ def _halley_step(value, slope, half, bend):
 
 
 class Guessed(Record):
-    """A level that is a polynomial of time, of which a guess of the first root above 0 is improved and proven."""
+    """A level that is a polynomial of time; a guess of its first root above 0 is improved and proven."""
 
     def turn(self):
-        """Where to guess the first root from."""
+        """Return the time from which to guess the first root."""
         c, b, a2, a3 = self._cubic()
         return _turn(c, b, a2, a3)
 
     def aim(self, turn):
-        """A guess of the first root."""
+        """Return a guess of the first root."""
         c, b, a2, a3 = self._cubic()
         return _guess(c, b, a2, a3, turn)
 
     def _cubic(self):
-        """A cubic that is the level on the wall, and about it up to the window."""
+        """Return a cubic that equals the level on the wall, and about equals it up to the window."""
         raise NotImplementedError
 
     def aims(self, length):
-        """(the first root or a guess of it, the given length or 0 if it is the root)."""
+        """Return (the first root or a guess of it, the given length or 0 if it is the root)."""
         time = self.aim(self.turn())
         for k in range(AIMED):
             time, length = self.aimed(self.nearer(time), length, k == AIMED - 1)
         return time, length
 
     def nearer(self, t):
-        """A time nearer to the root, by a step of Halley's method."""
+        """Return a time nearer to the root, by a step of Halley's method."""
         return t - self._halley(t).way
 
     def aimed(self, t, length, is_last):
@@ -146,19 +146,19 @@ class Guessed(Record):
         return select(goes_on, root, t), select(goes_on & found, 0.0, length)
 
     def _halley(self, t):
-        """A step of Halley's method from a time."""
+        """Return a step of Halley's method from a time."""
         raise NotImplementedError
 
     def _is_below(self, root, is_last):
-        """Whether it is surely below 0 until a root; the last time by the halves of the way too."""
+        """Whether the level is surely below 0 until a root; with `is_last` also by the halves of the way."""
         raise NotImplementedError
 
 
 class PolynomialFlight(Guessed):
-    """The steps of a flight along which c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4 is to rise through 0.
+    """The steps of a flight to the time when c + 2 b t + a2 t^2 + a3 t^3 + a4 t^4 rises through 0.
 
-    Of a solid the polynomial begins at the time `since`, and what is after `until` does not count; of a cavity both are
-    None. The first step is at most of the length `window`.
+    For a solid the polynomial begins at the time `since`, and a rise after `until` does not count; for a cavity both
+    are None. The first step is at most of the length `window`.
     """
 
     c: float
@@ -191,21 +191,21 @@ class PolynomialFlight(Guessed):
 
     def _is_below(self, root, is_last):
         before = self._before(root)
-        # What is below 0 by its coefficients is so by those of its halves.
+        # A level that is below 0 by its coefficients is so by those of its halves.
         return _are_below(before) | (is_last & _are_below_in_halves((*before, 0.0)))
 
     def is_free(self, until):
-        """Whether it is surely below 0 until this time."""
+        """Whether the level is surely below 0 until this time."""
         last = self.c + until * (2.0 * self.b + until * (self.a2 + until * (self.a3 + until * self.a4)))
         return _are_below(self._before(until)) & (last < 0.0)
 
     def _before(self, t):
-        """Its Bernstein coefficients from 0 to t but for the last; until then it is nowhere above the largest."""
+        """Return its Bernstein coefficients from 0 to t but the last; until then it is nowhere above the largest."""
         c, q1, q2, q3 = self.c, 2.0 * t * self.b, t * t * self.a2, t * t * t * self.a3
         return c, c + 0.25 * q1, c + 0.5 * q1 + (1.0 / 6.0) * q2, c + 0.75 * q1 + 0.5 * q2 + 0.25 * q3
 
     def next_step(self, t, last):
-        """One step towards the first root, as those of `course.Fall`: (t, its length or 0 if it is the last)."""
+        """Return one step towards the first root, as in `course.Fall`: (t, its length or 0 if it is the last)."""
         s = t if self.since is None else t - self.since
         c, b, a2, a3, a4, _window = Quartic(self.c, self.b, self.a2, self.a3, self.a4, 0.0).moved(s)
         # Where neither of the higher terms rises, the parabola is above the level for ever.
@@ -233,19 +233,19 @@ class PolynomialFlight(Guessed):
 
 
 class ConvexFlight(PolynomialFlight):
-    """The same where the level bends upwards all the way, so that the cubic rises: it bends the other way once at most.
+    """A flight along which the level bends upwards all the way, so that its cubic has one inflection at most.
 
-    Only the guess asks for that, so it need not be certain.
+    Only the guess relies on that, so it need not be certain.
     """
 
     def turn(self):
         _c, _b, a2, a3 = self._cubic()
-        # A parabola bends one way only: its root is that of the guess from the start on.
+        # A parabola bends one way only: it is the parabola of the guess from the start on.
         return select(a3 == 0.0, 0.0, -a2 / select(a3 == 0.0, 1.0, 3.0 * a3))
 
 
 class PolynomialFall(Guessed):
-    """A level of any degree along a fall, by its coefficients from that of t^0 on, and a time to cross the surface."""
+    """A level of any degree along a fall: its coefficients from t^0 on, and a time in which it crosses the surface."""
 
     powers: Any
     window: float
@@ -256,7 +256,7 @@ class PolynomialFall(Guessed):
         return select((time > 0.0) & (time < longest), time, longest)
 
     def _cubic(self):
-        # The level there, with the terms from t^3 on as they are half the way across
+        # The level there, with the terms from t^3 on taken half the way across
         c, b, a2 = self.powers[:3]
         a3 = 0.0
         for a in reversed(self.powers[3:]):
@@ -272,13 +272,13 @@ class PolynomialFall(Guessed):
         for k in range(len(self.powers) - 1, 1, -1):
             bend = 0.5 * k * (k - 1) * abs(self.powers[k]) + t * bend
         step = _halley_step(value, slope, half, bend)
-        # Where a level falls slowly, or not at all, a step goes nowhere near.
+        # Where a level falls slowly, or not at all, a step leads far away.
         longest, shortest = (1.0 - _BACK) * t, (1.0 - _AHEAD) * t
         way = select(step.way < longest, select(step.way > shortest, step.way, shortest), longest)
         return step._replace(way=way)
 
     def is_free(self, until):
-        """Whether it is surely below 0 until this time."""
+        """Whether the level is surely below 0 until this time."""
         return _are_below(bernstein(self.powers, until))
 
     def _is_below(self, root, is_last):

@@ -1,11 +1,11 @@
-"""Until when the level of a wall that moves surely stays below 0: safe steps of one wall.
+"""Safe steps of one wall that moves: until when its level surely stays below 0.
 
 In the frame of a wall the flight is a curve: its velocity w, acceleration a and jerk j have bounds W, A and J for any
-time ahead. Along it the level f of a wall with the inner function q, where H = grad grad q/2 has eigenvalues of at most
-the magnitude m, has
+time ahead. Let q be the inner function of the wall, with eigenvalues of H = grad grad q/2 of at most the magnitude m.
+The level f along the flight has
     f' = grad q.w,   f''/2 = w.H w + grad q.a/2,   |f'''| <= 6 m W A + |grad q| J,
-the last where H is constant. A step ends where the parabola above f rises through 0; near the hit each one triples the
-digits, or doubles them where only f'' has a bound.
+where the last holds if H is constant. A step ends where the parabola above f rises through 0. Near the hit each step
+triples the digits, or doubles them where only f'' has a bound.
 """
 
 import math
@@ -19,7 +19,7 @@ from ...kernel.record import Record
 from ...kernel.vector import ZERO, Vec, absolute, cross, dot, norm, times, total
 from .course import Majorant, positive, rise_time
 
-# The bounds of a step hold for at most so many times its length, after so many trials.
+# The bounds of a step hold for at most this many times its length, after this many trials.
 _CLOSE, _TRIALS = 2.0, 8
 
 
@@ -27,7 +27,7 @@ _CLOSE, _TRIALS = 2.0, 8
 
 
 class Flight(Record):
-    """A free flight, and how much of the frame is left at its start [s]."""
+    """A free flight, and how much of the frame remains at its start [s]."""
 
     r: Vec
     v: Vec
@@ -40,7 +40,7 @@ class Flight(Record):
         return self.r + displacement(self.pull, self.v, t)
 
     def velocity(self, t):
-        """Its velocity then."""
+        """The velocity of the particle after a time."""
         return accelerated(self.pull, self.v, t)
 
     def weight(self):
@@ -48,11 +48,11 @@ class Flight(Record):
         return None if self.pull is None else norm(self.pull)
 
     def fastest(self, t):
-        """A bound of its speed until then."""
+        """A bound of the speed up to a time."""
         return self.speed if self.pull is None else self.speed + t * norm(self.pull)
 
     def seen(self, t, wall, pull):
-        """The particle after a time as `InWallFrame` in the frame of a wall `Posed` then; this pulls it, or None."""
+        """Return the particle at t as `InWallFrame` of a wall that is `Posed` then; `pull` acts on it, or None."""
         p, v = self.place(t), self.velocity(t)
         return InWallFrame(
             wall.drive, wall.own_place(p), wall.own_velocity(p, v),
@@ -65,17 +65,17 @@ class Flight(Record):
 class Jerk(Record):
     """The third derivative of a place in the frame of a wall for some time."""
 
-    known: Any  # what is known of it, or None
-    rest: float  # a bound of what it may be beside that
-    off: float  # after a time t the place is beside the cubic by off t^3/6 at most
+    known: Any  # the part that is known, or None
+    rest: float  # a bound of the part that is not known
+    off: float  # after a time t the place differs from the cubic by off t^3/6 at most
 
     def along(self, normal):
-        """What is known of it along a normal."""
+        """The known part along a normal."""
         return 0.0 if self.known is None else dot(normal, self.known)
 
 
 class InWallFrame(Record):
-    """A particle in the frame of a wall at one time of its flight, and what bounds its way from there."""
+    """A particle in the frame of a wall at one time of its flight, and the bounds of its way from there."""
 
     drive: Any  # a `Drive`
     r: Vec
@@ -84,22 +84,22 @@ class InWallFrame(Record):
     speed: float  # a bound of |v| in the scene
     arm: float  # its distance from the centre of the rotation; 0 without a rotation
     weight: Any  # |G|, or None
-    coordinates: float  # what the round-off of its place is relative to [m]
+    coordinates: float  # the scale of the round-off of its place [m]
 
     def fastest(self, within):
-        """A bound of its speed for so long [s], relative to where the motion carries the centre of the rotation."""
+        """A bound of the speed up to `within` [s], relative to the centre of the rotation as the motion carries it."""
         own = self.speed if self.weight is None else self.speed + self.weight * within
         return own + self.drive.fastest
 
     def hardest(self):
-        """That of its acceleration."""
+        """A bound of the acceleration, relative to the same centre."""
         hardest = self.drive.hardest
         return hardest if self.weight is None else self.weight + hardest
 
     def bounds(self, within):
-        """`Bounds` that hold for so long [s]."""
+        """Return the `Bounds` that hold up to `within` [s]."""
         drive, spin = self.drive, self.drive.angular_speed()
-        # Derivatives of A^T (r - c - d), where each of A^T turns by the rate once more
+        # Derivatives of A^T (r - c - d): each derivative of A^T adds a factor of the rate
         speed, hard = self.fastest(within), self.hardest()
         arm = self.arm + speed * within
         return Bounds(
@@ -109,27 +109,27 @@ class InWallFrame(Record):
         )
 
     def jerk(self, within):
-        """Its `Jerk` for so long [s]."""
+        """Return the `Jerk` up to `within` [s]."""
         drive, turn = self.drive, self.drive.turn
         if turn is None:
             return Jerk(None, drive.jerk, drive.jerk)
         # Of x = r - c - d with the derivatives x1, x2, x3 it is A^T (x3 - 3 w x x2 + 3 w x (w x x1) + w^2 w x x).
-        # All but the first is known now, and changes as A^T turns by the rate once more.
+        # All terms but the first are known now, and change as A^T turns by the rate once more.
         spin, spins = abs(turn.rate), turn.rate * turn.axis
         known = cross(spins, spin * spin * (self.r - drive.center) - 3.0 * (self.a + cross(spins, self.v)))
         speed = self.fastest(within)
         fourth = 6.0 * self.hardest() + spin * (4.0 * speed + spin * (self.arm + speed * within))
         grows = within * spin * (3.0 * drive.jerk + spin * fourth)
-        # What grows as k t moves a place by k t^4/24.
+        # A jerk that grows as k t moves a place by k t^4/24.
         return Jerk(known, drive.jerk + grows, drive.jerk + 0.25 * grows)
 
     def place(self, t, jerk):
-        """Its place after a time, but for the rest of its `Jerk`."""
+        """The place after a time, without the part of the jerk that is not known."""
         a = self.a if jerk.known is None else self.a + (t * (1.0 / 3.0)) * jerk.known
         return self.r + t * (self.v + (0.5 * t) * a)
 
     def pulls(self, within):
-        """The `MostPull` along each axis that bounds its places for so long [s]."""
+        """The `MostPull` along each axis that bounds the places up to `within` [s]."""
         most, jerk = self.bounds(within).acceleration, self.jerk(within)
         x, y, z = (0.0, 0.0, 0.0) if jerk.known is None else jerk.known
         ahead = Vec(*(jerk.off + positive(along) for along in (x, y, z)))
@@ -142,22 +142,22 @@ class InWallFrame(Record):
 
 
 def flight_of(r, v, gravity, remaining, speed=None):
-    """The flight of a particle, and its speed where that is known."""
+    """Return the flight of a particle; `speed` is that of v, if known."""
     pull = None if gravity is None else as_vector(gravity)
     return Flight(r, v, pull, remaining, norm(v) if speed is None else speed)
 
 
-# --- What walls that move never reach --------------------------------------------------------------------
+# --- The core, which a wall that moves never reaches -----------------------------------------------------
 
-# Of the size of a cavity: what is computed to be so deep is as deep as it is to be.
+# Part of the size of a cavity: a computed depth below this part is a true depth in spite of round-off.
 CORE = 1.0 - 1e-12
 
 
 class Passage(Record):
-    """When a straight flight enters what a wall never reaches, and leaves it, and when it meets the wall on average.
+    """When a straight flight enters and leaves the core, which the wall never reaches, and when it hits the mean wall.
 
-    It misses it if it does not enter it before it leaves it. The level may rise through 0 at most `once`: after that
-    it is above 0 at all times, if the flight goes on.
+    A flight that would leave the core before it enters it misses the core. The level may rise through 0 at most `once`:
+    after that it is above 0 at all times, if the flight continues.
     """
 
     enters: float
@@ -166,19 +166,19 @@ class Passage(Record):
     once: Any
 
     def free(self):
-        """Until when no hit is possible; infinite where the level rises through 0 at most once, whenever that is."""
+        """The time until which no hit is possible; infinite where the level rises through 0 at most once, if ever."""
         return select(self.once, math.inf, select(self.enters <= 0.0, self.leaves, 0.0))
 
 
 def passage_of(c, b, a, level, depth, swings):
-    """The `Passage` of a flight along which q is c + 2 b t + a t^2, of a wall where it is `level`.
+    """Return the `Passage` of a flight along which q is c + 2 b t + a t^2, with a wall where q is `level`.
 
-    The wall swings by s(t), and q = |rho|^2 in lengths of which swings have `depth` to one of the scene. With the
+    The wall swings by s(t). q = |rho|^2, where `depth` times a length of the scene is a length of rho. With the
     velocity u in the frame of the middle and sums of all swings over |s|^2 + |s'|^2/w^2 = Q^2, the level f has
         f'/2 = (rho - s).(u - s') = rho.u - s.u - (rho - s).s',   |s.u + (rho - s).s'| <= sum Q sqrt(u^2 + L w^2),
         f''/2 = |u - s'|^2 - (rho - s).s'' >= u^2 - sum w Q sqrt(4 u^2 + L w^2),
-    as |rho - s|^2 <= L until the wall is met. Where f'' > 0 it rises through 0 once. So it does where |rho.u| is above
-    the first bound at both ends of the core: f falls on the way there, and rises from there on.
+    as |rho - s|^2 <= L until the wall is met. Where f'' > 0 the level rises through 0 once. So it does where |rho.u| is
+    above the first bound at both ends of the core: f falls on the way there, and rises from there on.
     """
     moves, wide = a > 0.0, select(level > 0.0, level, 0.0)
     radius, amplitude = math.sqrt(wide), depth * swings.amplitude()
@@ -189,12 +189,12 @@ def passage_of(c, b, a, level, depth, swings):
     inverse = select(moves, 1.0 / select(moves, a, 1.0), 0.0)
     middle, in_core = -b * inverse, b * b - a * (c - width * width)
     half = _root(in_core) * inverse
-    # A flight from beyond the mean wall that misses the core is short: from beyond its end the guess gets there.
+    # A flight from beyond the mean wall that misses the core is short: a guess from beyond its end leads to it.
     out = _root(b * b - a * (c - select((c > level) & (in_core < 0.0), farthest * farthest, level)))
     # (sum Q x)^2 <= sum Q sum Q x^2
     is_convex = CORE * (a * a) > q1 * (4.0 * a * q1 + wide * q3)
     once = moves & (is_convex | ((width > 0.0) & (in_core > q0 * (a * q0 + wide * q2))))
-    # Outwards from beyond the mean wall it is met some time later: as for the way back, for a guess.
+    # Outwards from beyond the mean wall the hit is some time later; for a guess as much as the way back takes.
     hits = select(out > b, out - b, b) * inverse
     return Passage(middle - half, middle + half, select(moves, hits, math.inf), once)
 
@@ -205,7 +205,7 @@ def passage_of(c, b, a, level, depth, swings):
 class Level(Majorant):
     """A level with a bound of its third derivative: f, f'/2, f''/2, |grad q| and m.
 
-    A convex cavity has a steepest place, on its wall: `steepness` is nowhere less than there, and does not grow.
+    A convex cavity is steepest on its wall: `steepness` is at least the value there, and does not grow.
     """
 
     c: float
@@ -216,7 +216,7 @@ class Level(Majorant):
     grows: Any = True
 
     def of_rows(self, given):
-        """The level with the first of its numbers given: three, or four."""
+        """Return the level with its first three or four numbers replaced by the given ones."""
         return Level(*given, *self[len(given) :])
 
     def third(self, bounds, within):
@@ -227,31 +227,31 @@ class Level(Majorant):
         return 6.0 * self.magnitude * bounds.speed * bounds.acceleration + moved * bounds.jerk
 
     def own_rise(self):
-        """When its own parabola rises."""
+        """The time when the level's own parabola rises."""
         return rise_time(self.c, self.b, self.a2)
 
     def ahead(self):
-        """The level that may rise."""
+        """The level that may rise: this one."""
         return self
 
     def moved(self, way, meets):
-        """Its own parabola from a little later on, where it is 0 if it meets the wall."""
+        """The level's own parabola from a little later on, where it is 0 if the flight meets the wall."""
         here = self.a2 * way
         return self._replace(c=select(meets, 0.0, self.c + way * (2.0 * self.b + here)), b=self.b + here)
 
     def is_admissible(self):
-        """Whether it is not above 0 here."""
+        """Whether the level is not above 0 here."""
         return self.c <= 0.0
 
     def is_below(self, sixth, within, is_start):
-        """Whether it is surely not above 0 for so long, from a start on or back from an end."""
+        """Whether the level is surely not above 0 up to `within`, from a start on or back from an end."""
         slope = 2.0 * self.b if is_start else -2.0 * self.b
         return _highest(self.c, slope, self.a2, sixth, within, is_start) <= 0.0
 
     def soonest(self, sixth, within, is_first):
-        """When it rises at the soonest, if a sixth of f''' is bounded within that time.
+        """The soonest time when the level rises, if f'''/6 is at most `sixth` up to `within`.
 
-        How deep a particle is that leaves no wall, the parabola alone knows.
+        Only the parabola itself tells how deep a particle is that does not start at a wall.
         """
         return self.rises_after_leaving(sixth, within) if is_first else self.rises(sixth, within)
 
@@ -265,7 +265,7 @@ class Between(Record):
     radius: float
 
     def of_rows(self, given):
-        """As of a `Level`."""
+        """Return the levels with the given numbers instead, as `Level.of_rows`."""
         return self._replace(place=given[0], half=given[1], bend=given[2])
 
     steepness = 1.0
@@ -275,29 +275,29 @@ class Between(Record):
         return bounds.jerk
 
     def ahead(self):
-        """That of the plane ahead."""
+        """The level of the plane ahead."""
         return Level(self.place - self.radius, self.half, self.bend, 1.0, 0.0)
 
     def moved(self, way, meets):
-        """As of a `Level`."""
+        """The levels a little later, as `Level.moved`."""
         here = self.bend * way
         place = select(meets, self.radius, self.place + way * (2.0 * self.half + here))
         return self._replace(place=place, half=self.half + here)
 
     def is_admissible(self):
-        """As of a `Level`."""
+        """Whether neither level is above 0 here."""
         return abs(self.place) <= self.radius
 
     def is_below(self, sixth, within, is_start):
-        """As of a `Level`."""
+        """Whether neither level is above 0 up to `within`, as `Level.is_below`."""
         slope = 2.0 * self.half if is_start else -2.0 * self.half
         ahead = _highest(self.place - self.radius, slope, self.bend, sixth, within, is_start)
         behind = _highest(-self.place - self.radius, -slope, -self.bend, sixth, within, is_start)
         return select(behind > ahead, behind, ahead) <= 0.0
 
     def own_rise(self):
-        """When the parabola of one of them rises."""
-        # The plane ahead, unless the particle turns short of it: then the one behind
+        """The time when the parabola of one of the planes rises."""
+        # The plane ahead; or the one behind, if the particle turns back before the plane ahead
         c, b, a = self.place - self.radius, self.half, self.bend
         discriminant = b * b - a * c
         reaches = (discriminant >= 0.0) | (a > 0.0)
@@ -307,14 +307,14 @@ class Between(Record):
         return select(under > 0.0, select(over > 0.0, over, 0.0) / under, math.inf)
 
     def soonest(self, sixth, within, is_first):
-        """When one of them rises at the soonest, as of a `Level`."""
+        """The soonest time when one of the levels rises, as `Level.soonest`."""
         b, k = self.half, sixth * within
         c, a = self.place - self.radius, self.bend + k
         discriminant = b * b - a * c
         root = _root(discriminant)
         reaches = ((discriminant >= 0.0) | (a > 0.0)) & (b + root > 0.0)
         ahead = select(reaches, select(c < 0.0, -c, 0.0) / (b + root), math.inf)
-        # The one behind: the particle moves away from it.
+        # The plane behind: the particle moves away from it.
         c, a = -self.place - self.radius, k - self.bend
         behind = select(a > 0.0, (b + _root(b * b - a * c)) / a, math.inf)
         if is_first:
@@ -324,14 +324,14 @@ class Between(Record):
 
 
 def nearest_root(c, b, a):
-    """How far ahead, or back, c + 2 b t + a t^2 rises through 0 next to here; infinite if it does not rise here."""
+    """The time, ahead or back, to the nearest rise of c + 2 b t + a t^2 through 0; infinite if it falls here."""
     bottom = b + _root(b * b - a * c)
     return select(b > 0.0, -c / select(b > 0.0, bottom, 1.0), math.inf)
 
 
 def _highest(c, slope, a, sixth, within, is_start):
-    """A bound of c + slope t + a t^2 + sixth t^3 for so long; at a start c > 0 is round-off."""
-    # The bracket of what t is a factor of is convex, or grows: it is at most what it is at one of its ends.
+    """A bound of c + slope t + a t^2 + sixth t^3 up to `within`; at a start c > 0 is round-off."""
+    # The factor of t in the brackets is convex, or grows: it is at most its value at one of its ends.
     last = slope + within * (a + within * sixth)
     steepest = select(last > slope, last, slope)
     c = select(c > 0.0, 0.0, c) if is_start else c
@@ -354,18 +354,18 @@ class LevelStep(Record):
 
 
 class Ahead(Record):
-    """A level along a flight, and what bounds it for some time ahead."""
+    """A level along a flight, and its bounds for some time ahead."""
 
     def rise(self, within):
-        """When it rises through 0, with bounds that hold for so long."""
+        """The time when the level rises through 0, by bounds that hold up to `within`."""
         raise NotImplementedError
 
     def longest(self, longest):
-        """The longest time, of at most this one, in which the level surely does not rise."""
+        """Return the longest time, up to `longest`, in which the level surely does not rise."""
         time, within, too_long = 0.0, longest, longest
         for _k in range(_TRIALS):
             time = max(time, min(self.rise(within), within))
-            # The bounds grow with the time that they hold for: those of a long time say little of a short step.
+            # The bounds grow with the time that they hold for: those for a long time are useless for a short step.
             too_long = select(time < within, within, too_long)
             if not _CLOSE * time < too_long:
                 break
@@ -374,7 +374,7 @@ class Ahead(Record):
 
 
 class SecondDerivativeBound(Ahead):
-    """Of a level with a bound of its second derivative."""
+    """A level with a bound of its second derivative."""
 
     seen: InWallFrame
     level: float
@@ -397,7 +397,7 @@ class SecondDerivativeBound(Ahead):
 
 
 class ThirdDerivativeBound(Ahead):
-    """Of a level with one of its third derivative."""
+    """A level with a bound of its third derivative."""
 
     body: Any
     seen: InWallFrame
@@ -413,15 +413,15 @@ class ThirdDerivativeBound(Ahead):
 
 
 def level_step(body, seen, level, longest):
-    """The `LevelStep` of a level with a bound of its third derivative; its time is at most the longest."""
+    """Return the `LevelStep` of a level with a bound of its third derivative; its time is at most `longest`."""
     return LevelStep(level.c, level.b, ThirdDerivativeBound(body, seen, level).longest(min(level.own_rise(), longest)))
 
 
 def patch_step(wall, is_behind, edges, seen, longest):
-    """The `LevelStep` of a part of a wall, until the wall is met and until the place is between all edges of the part.
+    """Return the `LevelStep` of a part of a wall: until the wall is met and the place is between all edges of the part.
 
-    From behind the wall, where a particle has come to beyond an edge, it meets the part only after it has come back.
-    The wall is then given as seen from there; the edges are planes; their admissible side is beyond them.
+    A particle that came behind the wall beyond an edge meets the part only after it has come back: `is_behind`, and the
+    wall is then given as seen from there. The edges are planes; their admissible side is beyond them.
     """
     step, is_there = level_step(wall, seen, wall.level_along(seen), longest), not is_behind
     time = step.time
@@ -435,10 +435,10 @@ def patch_step(wall, is_behind, edges, seen, longest):
 
 
 def plane_step(level, n, seen, longest):
-    """The `LevelStep` of a plane across the unit normal n, out of its admissible side, at which there is such a level.
+    """Return the `LevelStep` of a plane with the unit normal n out of its admissible side and this level.
 
-    Its bound holds for twice the time in which the parabola of the flight rises: near the plane it leaves the cube of
-    the step.
+    Its bound holds for twice the time in which the parabola of the flight rises: near the plane the cube of the step
+    remains.
     """
     half, bend = 0.5 * dot(n, seen.v), 0.5 * dot(n, seen.a)
     ahead = 2.0 * rise_time(level, half, bend)
@@ -450,7 +450,7 @@ def plane_step(level, n, seen, longest):
 
 
 def bent_step(body, seen, longest):
-    """The `LevelStep` of a wall that bounds its bend."""
+    """Return the `LevelStep` of a wall that bounds its bend."""
     n, level, most, magnitude, reach, clear = body.bent(seen.r)
     half = 0.5 * body.side * dot(n, seen.v)
     bent = SecondDerivativeBound(seen, level, half, norm(n), most, magnitude, reach, clear)
@@ -458,15 +458,15 @@ def bent_step(body, seen, longest):
 
 
 def bounds_along(n, seen, within):
-    """`Bounds` of a flight that a flat wall with this normal sees: only the jerk along that counts.
+    """Return the `Bounds` of a flight that meet a flat wall with this normal: only the jerk along the normal counts.
 
-    Where a motion has none of it, a particle that leaves the wall at no speed stays at it without end.
+    Without any jerk along it, a particle that leaves the wall at no speed stays at it without end.
     """
     bounds, drive = seen.bounds(within), seen.drive
     if drive.turn is None:
         jerk = total(absolute(times(n, drive.jerks)))
     else:
-        # Along its axis a rotation leaves a place as it is.
+        # A rotation leaves a place along its axis unchanged.
         axis = drive.turn.axis
         along = dot(n, axis)
         jerk = abs(along) * total(absolute(times(axis, drive.jerks))) + norm(n - along * axis) * bounds.jerk

@@ -1,4 +1,4 @@
-"""When a flight meets walls in any motion: safe steps of all walls, so that no hit is skipped."""
+"""The time when a flight meets walls in any motion: safe steps of all walls, so that no hit is skipped."""
 
 import math
 from typing import Any
@@ -16,21 +16,21 @@ from .flights import NEVER, Hit, hit, sooner, soonest
 from .march import SafeStep, Search, first_met
 from .rising import Flight, flight_of
 
-# A flight that is past a wall by so many times the round-off of its place is at it.
+# A flight that is past a wall by at most this many times the round-off of its place is at the wall.
 _ROUND_OFF = 8.0
-# The bounds of a flight in the cell of a field hold for at most so many times its length, after so many trials.
+# The bounds of a flight in the cell of a field hold for at most this many times its length, after this many trials.
 _CLOSE, _TRIALS = 2.0, 8
-# At first they hold for so many times as long as it would be in its cell if it went straight on.
+# At first they hold for this many times the time that a straight flight would be in its cell.
 CURVED = 1.5
 
 
 class ShortestStep(Record):
-    """The shortest safe step of all walls, its wall and how far it goes; a wall that is passed, or -1, and how far."""
+    """The shortest safe step of all walls, its wall and its way; a wall that the flight has passed, or -1, how far."""
 
     time: float
     wall: float
     way: float
-    room: float  # what way counts as none
+    room: float  # a shorter way is round-off
     past: float
     depth: float
 
@@ -42,7 +42,7 @@ _NO_STEP = ShortestStep(math.inf, -1.0, math.inf, 0.0, -1.0, 0.0)
 
 
 def seen_by_walls(walls, flight, t):
-    """(wall, its number, `Seen`) of each wall in no field that is met by safe steps, last to first."""
+    """Return (wall, its number, `Seen`) of each wall outside of fields that is met by safe steps, last to first."""
     found: Any = ()
     seen = None
     for number, wall in walls.numbered():
@@ -54,7 +54,7 @@ def seen_by_walls(walls, flight, t):
 
 
 def _nearest(walls, flight, t, longest):
-    """The `ShortestStep` of all walls that are met by safe steps."""
+    """Return the `ShortestStep` of all walls that are met by safe steps."""
     found = _NO_STEP
     for wall, number, seen in seen_by_walls(walls, flight, t):
         found = _nearer(seen, wall.body, number, found, longest)
@@ -66,9 +66,9 @@ def _nearest(walls, flight, t, longest):
 
 @outlined
 def _nearest_in_cell(field, number, found, flight, t, longest):
-    """The nearest of what is found and the bodies of the cell in which a particle is then.
+    """Return the shorter step of `found` and those to the bodies of the cell in which the particle is at t.
 
-    To leave the cell ends a step, but is no hit.
+    A step may end where the particle leaves the cell, which is no hit.
     """
     grid, seen = field.body.grid, field.seen(flight, t)
     until = until_next_cell(field.body, seen, min(found.time, longest))
@@ -88,13 +88,13 @@ def _nearest_in_cell(field, number, found, flight, t, longest):
 
 @outlined
 def until_next_cell(members, seen, longest):
-    """A time up to the longest during which a particle, seen in the frame of a field, is surely near its cell.
+    """Return a time up to `longest` during which a particle, seen in the frame of a field, is surely near its cell.
 
-    Or near the block of free cells around it, if these are known.
+    Near the block of free cells around its cell, where these are known.
     """
     grid = members.grid
     cell, time = cell_of(grid, seen.r), 0.0
-    # The bound of the acceleration grows with the time that it holds for: that of a flight that goes straight on.
+    # The bound of the acceleration grows with the time that it holds for: at first the time of a straight flight.
     within = min(CURVED * members.until_out(cell, None, seen.r, seen.v), longest)
     for _k in range(_TRIALS):
         until = members.until_out(cell, seen.pulls(within), seen.r, seen.v)
@@ -106,7 +106,7 @@ def until_next_cell(members, seen, longest):
 
 
 def _nearer(seen, body, number, rest, longest):
-    """The `ShortestStep` of one wall and the rest."""
+    """Return the shorter `ShortestStep` of one wall and `rest`."""
     step = body.moving_step(seen, longest)
     is_past = (step.level > 0.0) & (step.half > 0.0)
     speed, room = seen.bounds(0.0).speed, 2.0 * EPSILON * seen.coordinates
@@ -118,7 +118,7 @@ def _nearer(seen, body, number, rest, longest):
 
 
 class ToWalls(Search):
-    """A flight to all walls that are met by safe steps, up to the longest time."""
+    """A flight to all walls that are met by safe steps, up to the time `longest`."""
 
     walls: Any
     flight: Flight
@@ -128,11 +128,11 @@ class ToWalls(Search):
         longest = self.longest - t
         near = _nearest(self.walls, self.flight, t, longest)
         is_past = near.past >= 0.0 and not is_first
-        # By round-off: a wall that bends as is said is not passed by more.
+        # By round-off: a wall that bends within its bounds is not passed by more.
         is_at = is_past and near.depth <= _ROUND_OFF * near.room
         if is_at:
             return SafeStep(t, 0.0, near.past, -1.0)
-        # A step that only ends with the longest time is no hit, however short.
+        # A step that only ends with the time `longest` is no hit, however short.
         arrives = near.time < longest and (not is_first or near.time == 0.0) and near.way <= near.room
         return SafeStep(t, near.time, select(arrives, near.wall, -1.0), select(is_past, near.past, -1.0))
 
@@ -142,13 +142,13 @@ class ToWalls(Search):
 
 @outlined
 def march_moving(walls, flight, longest):
-    """The first `Hit` with the walls that are met by safe steps, if there is one before the longest time."""
+    """Return the first `Hit` with the walls that are met by safe steps, if there is one before `longest`."""
     return Hit(*first_met(ToWalls(walls, flight, longest)))
 
 
 @outlined
 def march_alone(walls, r, v, pull, remaining):
-    """The same of a flight that has so much of the frame left [s]."""
+    """Return `march_moving` of a flight with `remaining` of the frame left [s]."""
     return march_moving(walls, flight_of(r, v, pull, remaining), remaining)
 
 
@@ -156,7 +156,7 @@ def march_alone(walls, r, v, pull, remaining):
 
 
 def free_time_moving(walls, gravity, r, v, remaining):
-    """A time during which a flight surely stays admissible, with so much of the frame left [s].
+    """Return a time during which a flight surely stays admissible, with `remaining` of the frame left [s].
 
     0 for a particle that is in contact now.
     """
@@ -170,10 +170,10 @@ def free_time_moving(walls, gravity, r, v, remaining):
 
 
 def _free_of(wall, gravity, r, v):
-    """The free time of one wall."""
+    """Return the free time of one wall."""
     if not wall.accelerates:
         return flights.free_time(gravity, Walls((wall,)), r, v)
-    # One safe step: of a flight of many steps the next one begins nearer to the wall.
+    # One safe step only: of a flight of many steps the next one begins nearer to the wall.
     step = wall.body.moving_step(wall.sees(gravity, r, v), wall.remaining)
     return select(step.level > 0.0, 0.0, step.time)
 
@@ -183,7 +183,7 @@ def _free_of(wall, gravity, r, v):
 
 @outlined
 def first_hit_moving(walls, gravity, r, v, remaining):
-    """The first `Hit` of a free flight with walls in any motion, with so much of the frame left [s]."""
+    """Return the first `Hit` of a free flight with walls in any motion, with `remaining` of the frame left [s]."""
     if walls.unions:
         return _first_hit_in_rooms(walls, gravity, r, v, remaining)
     found = closed_hit(walls.at(remaining), gravity, r, v)
@@ -195,7 +195,7 @@ def first_hit_moving(walls, gravity, r, v, remaining):
 
 
 def _first_hit_in_rooms(walls, gravity, r, v, remaining):
-    """`first_hit_moving` where some of the walls are those of unions."""
+    """Return `first_hit_moving` where some of the walls belong to unions."""
     found: Any = NEVER
     shared = tuple(wall for _number, wall in walls.shared())
     if shared:
@@ -211,7 +211,7 @@ def _first_hit_in_rooms(walls, gravity, r, v, remaining):
 
 
 def closed_hit(walls, gravity, r, v):
-    """The first hit with the walls that have a closed form."""
+    """Return the first hit with the walls that have a closed form."""
     found = NEVER
     for number, wall in reversed(walls.numbered()):
         if isinstance(wall, Field):

@@ -1,8 +1,8 @@
-"""Safe steps in lanes, to walls in any motion with levels that have a bound of their third derivative.
+"""Safe steps in lanes, to walls in any motion whose levels have a bound of their third derivative.
 
 A stride is one safe step of all walls together. Its bounds hold until the parabola of a level itself rises: near the
-hit what is not known of f''' is the only error, and a stride leaves the cube of its length. What a few strides do not
-find goes on in the next pass, from where it is.
+hit the part of f''' that is not known is the only error, and a stride leaves the cube of its length. A hit that a few
+strides do not find is searched in the next pass, from the place reached.
 """
 
 import math
@@ -15,24 +15,24 @@ from .flights import Hit
 from .rising import ThirdDerivativeBound, flight_of
 from .safe import closed_hit, seen_by_walls
 
-# What a lane knows of its way: the time of the flight so far, the wall that it has met or -1, and the first hit with
-# the walls that have a closed form; the speed at its start.
+# The rows of a lane: the time of the flight so far, the wall that it has met or -1, the time and the wall of the first
+# hit with walls that have a closed form, and the speed at its start.
 TIME, MET, CLOSED, OTHER, SPEED = 0, 1, 2, 3, 4
-# How many rows these are, and how many of them, the first, strides change.
+# The number of these rows, and of the first ones that strides change.
 KNOWN, FOUND = 5, 2
-# The bounds of a stride hold for at most so many times the pace of a wall: beyond, a power series says little.
+# The bounds of a stride hold for at most this many times the pace of a wall: beyond, a power series is useless.
 AHEAD = 32.0
 
 
 def start(walls, gravity, course, lane, r, v, remaining):
-    """The way of a flight with so much of the frame left [s] into a lane of the course."""
+    """Start a flight with `remaining` of the frame left [s] in a lane of the course."""
     found = closed_hit(walls.at(remaining), gravity, r, v)
     course[TIME, lane], course[MET, lane] = 0.0, -1.0
     course[CLOSED, lane], course[OTHER, lane], course[SPEED, lane] = found.time, found.wall, norm(v)
 
 
 def stride(walls, gravity, course, lane, r, v, remaining, is_first):
-    """One stride of a lane that has not met a wall."""
+    """Take one stride of a lane that has not met a wall."""
     t, met, closed = course[TIME, lane], course[MET, lane], course[CLOSED, lane]
     longest = select(closed < remaining, closed, remaining) - t
     known = levels_of(walls, flight_of(r, v, gravity, remaining, course[SPEED, lane]), t)
@@ -49,7 +49,7 @@ def stride(walls, gravity, course, lane, r, v, remaining, is_first):
 
 
 def levels_of(walls, flight, t):
-    """(the number of a wall, the `ThirdDerivativeBound` of its level then) of each that is met by strides."""
+    """Return (the number of a wall, the `ThirdDerivativeBound` of its level) of each wall that is met by strides."""
     return tuple(
         (number, ThirdDerivativeBound(wall.body, seen, wall.body.level_along(seen)))
         for wall, number, seen in seen_by_walls(walls, flight, t)
@@ -57,7 +57,7 @@ def levels_of(walls, flight, t):
 
 
 def _through_cores(known, r, v, remaining, t, longest):
-    """A time up to the longest until which a straight flight, free until t, surely stays where no wall ever comes."""
+    """Return a time up to `longest` until which a straight flight, free until t, surely stays in all cores."""
     first = longest
     for _number, one in known:
         way = one.seen.drive.passage(one.body, r, v, remaining)
@@ -69,7 +69,7 @@ def _through_cores(known, r, v, remaining, t, longest):
 
 
 def met(course, lane):
-    """The first `Hit` of a lane, if its strides have found it."""
+    """Return the first `Hit` of a lane, if its strides have found it."""
     t, met, closed = course[TIME, lane], course[MET, lane], course[CLOSED, lane]
     # No wall in any motion before the closed hit
     arrives = (met < 0.0) & (t >= closed)
@@ -77,7 +77,7 @@ def met(course, lane):
 
 
 def pace(walls):
-    """The shortest pace of all walls that move."""
+    """Return the shortest pace of all walls that move."""
     shortest = math.inf
     for wall in reversed(walls.each):
         mine = wall.drive.time_scale if isinstance(wall, Moving) else math.inf
@@ -86,7 +86,7 @@ def pace(walls):
 
 
 def _first_rise(known):
-    """When the first of the levels' own parabolas rises."""
+    """Return when the first of the levels' own parabolas rises."""
     first = math.inf
     for _number, one in known:
         mine = one.level.own_rise()
@@ -95,12 +95,12 @@ def _first_rise(known):
 
 
 def _first_stride(known, within, is_first):
-    """(when the first level may rise, its wall, whether it surely does but for round-off), with bounds for so long."""
+    """Return (when the first level may rise, its wall, whether it surely does up to round-off) within a time."""
     first, wall, meets_first = math.inf, -1.0, False
     for number, one in known:
         sixth, level = one.third(within) * (1.0 / 6.0), one.level
         time = level.soonest(sixth, within, is_first)
-        # The parabola is above f by no more than this.
+        # The parabola is above f by at most this.
         meets = 2.0 * sixth * within * time * time <= EPSILON * one.seen.coordinates * level.steepness
         mine = time < first
         first, wall = select(mine, time, first), select(mine, number, wall)
