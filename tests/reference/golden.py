@@ -64,6 +64,10 @@ the end that is here, which is what it was solved to.
 Eleven cells of walls that move, or turn by their inertia, were written again when contacts took the speeds of particle
 and wall along the normal, and the acceleration of a turning frame one cross product: 1e-15 at their ends.
 Two cells of sources of bodies were written again when centres of mass left BLAS: 1e-13 at their ends.
+34 runs of soft walls that meet in edges were written again when each contact of a particle with one wall counted as an
+impact, not only the first of those that overlap: the same ends by the bits, and the same observables but for "impacts".
+So was the cell of `Penalty` in a box with a log, and that with a temperature, where contacts that overlap no longer
+share a random number: two of them were one draw.
 
 The runs "cell: ..." are those of cells of `bench.cells` that work, one kind of wall for each engine and capability, and
 their digests are of the final state, the observables and the datasets of the trajectory, but for dates, versions,

@@ -46,7 +46,8 @@ DISCS = {
 }
 POSTS = {
     "nothing": lambda **wall: [],
-    "post": lambda **wall: [swarm.Cylinder(0.1, center=(0.05, 0.0, 0.0), side="outside", **wall)],
+    # No ball is as wide as a way past it: a ball that just fits between two walls ends a run.
+    "post": lambda **wall: [swarm.Cylinder(0.11, center=(0.05, 0.0, 0.0), side="outside", **wall)],
 }
 
 
