@@ -23,7 +23,7 @@ FACES = tuple(sign + axis for axis, sign in itertools.product("xyz", "-+"))
 
 
 def _faces(name: str, value: Any) -> tuple[str, ...]:
-    """`value` as the faces of a box that have no wall."""
+    """Return `value` as the faces of a box that have no wall."""
     given = list_of(name, value, "faces such as '+x'")
     faces = tuple(one_of(f"{name}[{i}]", face, FACES) for i, face in enumerate(given))
     for i, face in enumerate(faces):
@@ -42,8 +42,8 @@ class Box(Surface):
         half_widths: three numbers > 0 [m], from the centre to the faces.
         center: three numbers [m].
         side: "inside" or "outside", the admissible part.
-        open: faces without a wall, of "-x", "+x", "-y", "+y", "-z", "+z"; for a cavity only, and not all of them. The
-            others go on without end beyond them.
+        open: faces without a wall, of "-x", "+x", "-y", "+y", "-z", "+z"; for a cavity only, and not all six. The
+            other walls continue without end beyond an open face.
 
     Raises:
         SceneError: an argument is out of its range.

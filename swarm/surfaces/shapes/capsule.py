@@ -30,7 +30,7 @@ class Capsule(Revolved):
 
     Args:
         radius: R [m].
-        length: of the segment [m], from the middle of one half sphere to the other's, 0 or more.
+        length: of the segment [m], from the middle of one half sphere to that of the other, 0 or more.
         axis: along the segment before it is rotated; three numbers, not all 0.
         center: the middle of the segment, three numbers [m].
         side: "inside" or "outside", the admissible part.
@@ -100,7 +100,7 @@ class Capsule(Revolved):
 
 
 class CapsuleNumbers(Distance):
-    """A capsule as kernels take it, about the z axis."""
+    """The numbers of a capsule about the z axis."""
 
     center: Vec
     radius: float
@@ -109,7 +109,7 @@ class CapsuleNumbers(Distance):
     side: float
 
     def from_segment(self, r):
-        """The vector from the nearest point of the segment."""
+        """Return the vector to r from the nearest point of the segment."""
         d = r - self.center
         return Vec(d.x, d.y, d.z - np.minimum(np.maximum(d.z, -self.half), self.half))
 
@@ -132,8 +132,8 @@ class CapsuleNumbers(Distance):
     def first_hit(self, r, v):
         d, side, half = r - self.center, self.side, self.half
         tube = ball_rise_time(side, self.radius2, Vec(d.x, d.y, 0.0), Vec(v.x, v.y, 0.0))
-        # Where the flight meets the tube without ends decides: there, or at the sphere of that end. A flight towards a
-        # solid that is inside that tube already is before its end.
+        # The place where the flight meets the endless tube decides: it meets the solid there, or at the sphere of that
+        # end. A flight towards a solid that begins inside this tube begins beyond an end.
         within = d.x * d.x + d.y * d.y < self.radius2
         height = d.z + select((side < 0.0) & within, 0.0, v.z * tube)
         from_end = Vec(d.x, d.y, d.z - select(height > 0.0, half, -half))
@@ -144,8 +144,8 @@ class CapsuleNumbers(Distance):
     in_steps = False
 
     def near(self, gravity, r, v):
-        # Along a fall q is that of the sphere of an end or of the tube, and beyond the end of either differs from it by
-        # the square of the way beyond: higher than the tube's, lower than the sphere's.
+        # Along a fall q is that of the sphere of an end or of the tube. Beyond the end q differs from either by the
+        # square of the way beyond: it is higher than the tube's and lower than the sphere's.
         g, side, e = as_vector(gravity), self.side, self.from_segment(r)
         past = abs(r.z - self.center.z) - self.half
         in_tube, q = past <= 0.0, square(e)

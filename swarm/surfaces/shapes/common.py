@@ -1,4 +1,4 @@
-"""Base classes of shapes: of a squared distance as inner function, and of an exact chord."""
+"""Base classes of shapes: those with a squared distance as inner function, and those with an exact chord."""
 
 import math
 
@@ -10,7 +10,7 @@ from .. import contract
 
 # Smaller roots of an inner function are replaced by this number: the cube of its inverse is finite.
 _MIDDLE = 1e-100
-# From farther than the root of this many times the radius a flight first goes so much nearer.
+# A flight from farther than the root of this many times the radius first goes to a wider surface near it.
 _AFAR = 1024.0
 
 
@@ -37,7 +37,7 @@ class Distance(contract.Smooth):
         return self._replace(radius=width, radius2=width * width)
 
     def near_radius2(self, q):
-        """radius^2, or that of a thicker one that is near: from afar round-off of the level is that of the distance."""
+        """radius^2 or, from afar, that of a wider surface nearby: round-off of the level is that of the distance."""
         return select(q > _AFAR * self.radius2, q * (1.0 / _AFAR), self.radius2)
 
     def farthest_push(self):
@@ -49,8 +49,8 @@ class Distance(contract.Smooth):
         return self.inner_gradient(r) * (0.5 / np.maximum(np.sqrt(self.inner(r)), TINY))
 
     def gap_slope(self, q0, q1):
-        # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1)), which has no bound in the middle, where no wall
-        # pushes and what it is multiplied with is 0. There q1, the sum of q0 and a rise, may be below 0 by round-off.
+        # (sqrt(q1) - sqrt(q0))/(q1 - q0) = 1/(sqrt(q0) + sqrt(q1)) has no bound in the middle, where no wall pushes and
+        # its factor is 0. There q1, the sum of q0 and a rise, may be below 0 by round-off.
         root1 = math.sqrt(select(q1 > 0.0, q1, 0.0))
         both = math.sqrt(q0) + root1
         slope = 1.0 / select(both > _MIDDLE, both, _MIDDLE)
@@ -58,7 +58,7 @@ class Distance(contract.Smooth):
 
 
 class ExactChord(contract.Smooth):
-    """A shape that gives an exact `chord_guess`, and its gap is a distance up to round-off."""
+    """A shape with an exact `chord_guess`, and with a gap that is a distance up to round-off."""
 
     def chord_improve(self, r, p, kappa):
         return 0.0

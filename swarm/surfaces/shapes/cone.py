@@ -1,4 +1,4 @@
-"""Cone: phi = rho^2 cos^2 - z^2 sin^2 of one nappe, a quadric cut off by the plane through its apex."""
+"""Cone: phi = rho^2 cos^2 - z^2 sin^2 of one nappe: a quadric cut off by the plane through its apex."""
 
 import functools
 import math
@@ -21,9 +21,9 @@ from .quadratic import QuadricNumbers, quadric_numbers
 from .revolved import Revolved, tangents
 from .solid import body
 
-# Points around it, and parts of its height, of triangles.
+# The points around it, and the parts of its height, of its triangles.
 _ALONG, _RINGS = 96, 32
-# A cone nearer to its tangent plane than this [rad] leaves it by round-off only.
+# A cone nearer to its tangent plane than this [rad] differs from it by round-off only.
 _FLATTEST = 1e-12
 
 
@@ -31,12 +31,12 @@ _FLATTEST = 1e-12
 class Cone(Revolved):
     """One nappe of a circular cone: the space in it, or around the solid.
 
-    phi is in m^2: the distance from the wall times that from the opposite wall, and below the apex the depth [m] if
+    phi is in m^2: the distance from the wall times the distance from the opposite wall; below the apex the depth [m] if
     that is more. The apex is a singular point, where the wall has no normal: nearer to it than 1e-8 of a flight's
     length a hit is known to that distance only.
 
     Args:
-        half_angle: between the axis and the wall, in (0, pi/2) [rad].
+        half_angle: the angle between the axis and the wall, in (0, pi/2) [rad].
         axis: three numbers, not all 0; from the apex into the cone.
         center: the apex, three numbers [m].
         side: "inside" or "outside", the admissible part.
@@ -70,7 +70,7 @@ class Cone(Revolved):
             )
 
     def numbers(self) -> QuadricNumbers:
-        """The numbers of both nappes in the frame in which their axis is z."""
+        """Return the numbers of both nappes in the frame where their axis is z."""
         a, b = math.cos(self.half_angle) ** 2, -(math.sin(self.half_angle) ** 2)
         return quadric_numbers(self.own_center(), (a, a, b), (0.0,) * 3, 0.0, self.side)
 
@@ -81,7 +81,7 @@ class Cone(Revolved):
         if self.side == "inside":
             # The plane first: a flight along the axis meets both at the apex, and the plane has a normal there.
             return PlaneNumbers(Vec(-x, -y, -z), -offset), nappes
-        # As a solid, the half-space above the apex: what is admissible of it is below.
+        # As a solid: the half-space above the apex, which has its admissible side below
         return (body((nappes, PlaneNumbers(Vec(x, y, z), offset)), math.hypot(*self.center)),)
 
     def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
@@ -130,7 +130,7 @@ class Cone(Revolved):
         b = np.roll(a, -1, axis=1)
         quadrilaterals = a[:-1], b[:-1], b[1:], a[1:]
         if bottom == 0.0:
-            # All points of the first ring are the apex: one of them stands for it, in one triangle of each pair.
+            # All points of the first ring are the apex: one point stands for it, in one triangle of each pair.
             a[0] = b[0] = a[0, 0]
         triangles = halved(*quadrilaterals)
         kept = (triangles[:, 0] != triangles[:, 1]) & (triangles[:, 1] != triangles[:, 2])

@@ -1,4 +1,4 @@
-"""Cylinder: phi = (rho^2 - R^2)/(2 R), the distance to first order; a quadric, and a slab where it has caps."""
+"""Cylinder: phi = (rho^2 - R^2)/(2 R), the distance to first order; a quadric, with a slab where it has caps."""
 
 import math
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ class Cylinder(Revolved):
         return self.length is not None
 
     def numbers(self) -> QuadricNumbers:
-        """The numbers of the endless cylinder in the frame in which its axis is z."""
+        """Return the numbers of the endless cylinder in the frame where its axis is z."""
         a = 0.5 / self.radius
         return quadric_numbers(self.own_center(), (a, a, 0.0), (0.0,) * 3, 0.5 * self.radius, self.side)
 

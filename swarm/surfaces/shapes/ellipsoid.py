@@ -1,6 +1,6 @@
 """Ellipsoid: phi = q - 1, without unit; inner function q = x^2/a^2 + y^2/b^2 + z^2/c^2.
 
-It is the quadric of quadratic.py without a linear term; here is what that makes shorter.
+It is the quadric of quadratic.py without a linear term; this file has the methods that are shorter for it.
 """
 
 import math
@@ -99,7 +99,7 @@ class EllipsoidNumbers(QuadricNumbers):
 
     def level_window(self, c, d, v, pull):
         """(c, window)"""
-        # Outside, the size is that of the distance: the flight may begin far from a solid.
+        # Outside, the size is the distance: the flight may begin far from a solid.
         size = 1.0 + select(c > 0.0, c, 0.0)
         return level_and_window(c, 1.0, size, form(self.a, v, v), form(self.a, pull, pull))
 

@@ -13,7 +13,7 @@ from ..surface import UNBOUNDED, Box, HalfSpace, farthest
 from .quadratic import QuadricNumbers, quadric_numbers
 from .revolved import Revolved, tangents
 
-# Slopes of the tangent planes that stand in for the bowl.
+# Slopes of the tangent planes that stand in for the bowl
 _SLOPES = (0.5, 2.0)
 
 

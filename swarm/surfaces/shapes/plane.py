@@ -46,7 +46,7 @@ class Plane(Surface):
         return math.inf
 
     def bounds(self) -> Box:
-        # Half-spaces bound only together: scene.py does that.
+        # Half-spaces bound a volume only together: scene.py does that.
         return UNBOUNDED
 
     def half_spaces(self) -> list[HalfSpace]:
@@ -67,7 +67,7 @@ class Plane(Surface):
 
 
 class Flat(ExactChord):
-    """A plane or a part of it, with the fields of `PlaneNumbers`: the methods that do not depend on where it ends."""
+    """A plane or a part of it, with the fields of `PlaneNumbers`: the methods that do not depend on its edges."""
 
     if TYPE_CHECKING:
         normal: Any
@@ -132,7 +132,7 @@ class Flat(ExactChord):
 
 
 class PlaneNumbers(Flat):
-    """A plane as kernels take it."""
+    """The numbers of a plane."""
 
     normal: Vec
     offset: float
@@ -145,11 +145,11 @@ class PlaneNumbers(Flat):
         c = (place - self.offset) + depth + (1.0 - CORE) * (abs(place) + abs(self.offset))
         moves = abs(u) > 0.0
         inverse = select(moves, 1.0 / select(moves, u, 1.0), 0.0)
-        # A flight that goes along is there for ever, or never.
+        # A flight along the plane is at it for ever, or never.
         enters, leaves = select(u < 0.0, -c * inverse, -math.inf), select(u > 0.0, -c * inverse, math.inf)
         enters = select(moves | (c < 0.0), enters, math.inf)
         hits = select(u > 0.0, (self.offset - place) * inverse, math.inf)
-        # A particle faster than the wall comes nearer to it all the time, or leaves it.
+        # A particle faster than the wall approaches it all the time, or leaves it.
         return Passage(enters, leaves, hits, CORE * abs(u) > speed)
 
     def reversible(self):

@@ -30,24 +30,24 @@ class MatrixColumns(Record):
     z: Vec
 
     def solve(self, b):
-        """The vector that it turns into b."""
+        """Return the x with (this matrix) x = b."""
         across = cross(self.y, self.z)
         inverse = 1.0 / dot(self.x, across)
         return inverse * Vec(dot(across, b), dot(cross(self.z, self.x), b), dot(cross(self.x, self.y), b))
 
 
 class QuadricNumbers(contract.Smooth):
-    """A quadric as kernels take it; it, or its waist, may be small compared with the distance of a flight from it."""
+    """The numbers of a quadric; it, or its waist, may be small compared with the distance where a flight begins."""
 
     center: Vec
     a: Vec  # the diagonal of A in the principal frame
     b: Any  # a Vec; None in an ellipsoid
     level: float
-    scale: float  # by how much q varies over the surface's size
+    scale: float  # the variation of q over the surface's size
     side: float
 
     def by_right_angles(self, axes: Any) -> Any:
-        """The numbers of the quadric with these as its own axes: other axes of the scene, or their opposites."""
+        """Return the numbers of the quadric with these axes: other axes of the scene, or their opposites."""
         b = None if self.b is None else vec((axes @ np.array(self.b)).tolist())
         center, a = axes @ np.array(self.center), abs(axes) @ np.array(self.a)
         return self._replace(center=vec(center.tolist()), a=vec(a.tolist()), b=b)
@@ -63,8 +63,8 @@ class QuadricNumbers(contract.Smooth):
 
     def discriminant(self, d, v, c, b, a):
         """b^2 - a c, also from afar, where d is long."""
-        # = level v.A v + (b.v)^2/4 - w.(det A) A^-1 w + A v.(b x w) with w = d x v, Lagrange's identity. Of both forms
-        # the one with the smaller terms.
+        # = level v.A v + (b.v)^2/4 - w.(det A) A^-1 w + A v.(b x w) with w = d x v, Lagrange's identity; the form with
+        # the smaller terms is used.
         w, along = cross(d, v), 0.5 * self.linear(v)
         u, s = turning(self.a, w), times(times(self.a, v), cross(self.b, w))
         from_afar = self.level * a + along * along - total(u) + total(s)
@@ -73,7 +73,7 @@ class QuadricNumbers(contract.Smooth):
         return select(terms < b * b + abs(a * c), from_afar, b * b - a * c)
 
     def level_window(self, c, d, v, pull):
-        """(c, window) by the time in which the flight changes q by as much as it varies here.
+        """Return (c, window); in the window the flight changes q by as much as q varies here.
 
         The window is infinite where the level is a parabola.
         """
@@ -81,9 +81,9 @@ class QuadricNumbers(contract.Smooth):
         terms = form(magnitude, d, d) + tilt.x + tilt.y + tilt.z
         size = select(terms > self.scale, terms, self.scale)
         moving, falling = form(magnitude, v, v), form(magnitude, pull, pull)
-        # At the apex of a cone there is no size: the time after which the fall is as fast as the start.
+        # At the apex of a cone there is no size: it is the time after which the fall is as fast as the start.
         size = select(size > 0.0, size, moving * moving / falling)
-        # A cone has no size of its own to be far from.
+        # A cone has no size of its own to which a distance could be large.
         own = select(self.scale > 0.0, self.scale, math.inf)
         level, window = level_and_window(c, own, size, moving, falling)
         window = select(abs(window) > 0.0, window, 1.0)
@@ -100,7 +100,7 @@ class QuadricNumbers(contract.Smooth):
         return self.phi(r), b, form(self.a, v, v)
 
     def _step(self, r0, p, kappa):
-        """D(r0, r1) and r1 - r0 of the step, and the widths 1/(1 + kappa A).
+        """Return D(r0, r1) and r1 - r0 of the step, and the widths 1/(1 + kappa A).
 
         With G = grad q(r0): D = (G + A p)/(1 + kappa A) and r1 - r0 = (p - kappa G)/(1 + kappa A).
         """
@@ -159,12 +159,12 @@ class QuadricNumbers(contract.Smooth):
         a2 = a + form(self.a, d, pull) + 0.5 * self.linear(pull)
         a3, a4 = form(self.a, v, pull), 0.25 * form(self.a, pull, pull)
         c, window = self.level_window(c, d, v, pull)
-        # What is left of a3 where G A G is below the smallest number would be infinite after an infinite time.
+        # The rest of a3 where G A G is below the smallest number would be infinite after an infinite time.
         curved = side * select(window < math.inf, 1.0, 0.0)
         return Quartic(side * c, side * b, side * a2, curved * a3, curved * a4, window)
 
     def out_of(self, r):
-        # phi over its gradient is no more than the distance where phi is convex.
+        # phi over its gradient is at most the distance where phi is convex.
         convex = min(self.a.x, self.a.y, self.a.z) >= 0.0
         steepness = norm(self.gradient(r))
         out = -self.gap_of(self.inner(r)) / select(steepness > 0.0, steepness, 1.0)
@@ -208,7 +208,7 @@ class QuadricNumbers(contract.Smooth):
         return dot(n, e), -dot(n + bent, step.solve(_tilted(n, tilt)))
 
     def _turned_step(self, kappa, tilt):
-        """1 + kappa Q A, of the step of a wall that turns."""
+        """Return 1 + kappa Q A of the step of a wall that turns."""
         x, y, z = kappa * self.a
         return MatrixColumns(
             Vec(1.0 + x, -x * tilt.z, x * tilt.y), Vec(y * tilt.z, 1.0 + y, -y * tilt.x),
@@ -227,7 +227,7 @@ class QuadricNumbers(contract.Smooth):
         n, _moved, _widths = self._step(r, p, kappa)
         return self.unit_along(n)
 
-    # --- Of walls that move other than uniformly ---
+    # --- Walls that move other than uniformly ---
 
     def level_along(self, seen):
         n, most, side = self.inner_gradient(seen.r), largest(self.a), self.side
@@ -264,7 +264,7 @@ class ConvexQuadric(QuadricNumbers):
 
 
 def quadric_numbers(center: Vector, curvatures: Any, linear: Any, level: float, side: str) -> QuadricNumbers:
-    """The numbers of a quadric in its principal frame."""
+    """Return the numbers of a quadric in its principal frame."""
     a, b = vec(map(float, curvatures)), vec(map(float, linear))
     steepest = max(map(abs, a))
     scale = abs(level) + (square(b) / (4.0 * steepest) if steepest > 0.0 else 0.0)
@@ -291,7 +291,7 @@ def widths(a, kappa):
 
 
 def turning(a, w):
-    """The terms of w.(det A) A^-1 w."""
+    """Return the terms of w.(det A) A^-1 w."""
     return times(times(Vec(a.y * a.z, a.x * a.z, a.x * a.y), w), w)
 
 

@@ -36,12 +36,12 @@ class PrincipalFrame(NamedTuple):
     linear: NDArray[np.float64]  # b
     shift: NDArray[np.float64]
     level: float
-    middle: NDArray[np.float64]  # where the gradient is 0, except for the slope
-    height: float  # the level with all squares completed: phi = sum A d^2 - height, plus the slope
+    middle: NDArray[np.float64]  # where the gradient is 0, except for the linear part along the axes without curvature
+    height: float  # the level with all squares completed: phi = sum A d^2 - height, plus the linear part
     slope: float  # |b| along the axes without curvature
 
     def one_sign(self) -> bool:
-        """Whether phi is of the same sign everywhere."""
+        """Whether phi has the same sign everywhere."""
         low, high = self.curvatures.min(), self.curvatures.max()
         there = low < 0.0 < high if self.height == 0.0 else max(self.height * low, self.height * high) > 0.0
         return self.slope == 0.0 and not there
@@ -59,17 +59,17 @@ class PrincipalFrame(NamedTuple):
         return float(size) or math.inf
 
     def tightest(self, sign: float) -> tuple[float, NDArray[np.float64] | None]:
-        """The smallest radius of curvature of a side, and where relative to the center, None where it is infinite."""
+        """The smallest radius of curvature of a side, and where it is relative to the center: None if infinite."""
         most = float((sign * self.curvatures).max())
         if most <= 0.0:
             return math.inf, None
         curved = self.curvatures != 0.0
         along = np.where(curved, 0.0, self.linear)
         if self.slope > 0.0:
-            # Where the squares are 0: |grad phi| is the slope there.
+            # On the axis of the paraboloid the squares are 0, and |grad phi| is the slope.
             vertex = along * (self.height / self.slope**2)
             return self.slope / (2.0 * most), rotations.product(self.axes, np.where(curved, self.middle, vertex))
-        # The least sum of A^2 x^2 with the sum of A x^2 given is on the axis of the least A of that sign.
+        # The least sum of A^2 x^2 with a given sum of A x^2 is on the axis of the least A of the same sign.
         reach = np.where(self.curvatures * self.height > 0.0, abs(self.curvatures), math.inf)
         k = int(np.argmin(reach))
         if self.height == 0.0:
@@ -84,7 +84,7 @@ class PrincipalFrame(NamedTuple):
 
 
 def principal_frame(matrix: NDArray[np.float64], linear: NDArray[np.float64], constant: float) -> PrincipalFrame:
-    """The principal frame of d.A d + b.d + c."""
+    """Return the principal frame of d.A d + b.d + c."""
     # The eigenvectors of a diagonal matrix are the axes themselves, exactly.
     diagonal = not np.any(matrix - np.diag(np.diag(matrix)))
     curvatures, axes = (np.diag(matrix).copy(), np.eye(3)) if diagonal else np.linalg.eigh(matrix)
@@ -111,7 +111,7 @@ def principal_frame(matrix: NDArray[np.float64], linear: NDArray[np.float64], co
 
 
 def _symmetric(name: str, value: Any) -> Matrix:
-    """`value` as the three rows of a symmetric matrix."""
+    """Return `value` as the three rows of a symmetric matrix."""
     rows = entries(name, value, 3, "three rows of three numbers")
     a = np.array([vector(f"{name}[{i}]", row) for i, row in enumerate(rows)])
     for i, k in ((0, 1), (0, 2), (1, 2)):

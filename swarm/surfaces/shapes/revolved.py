@@ -1,4 +1,4 @@
-"""Surfaces of revolution: their axis."""
+"""Surfaces of revolution about an axis."""
 
 import math
 from typing import Any
@@ -10,7 +10,7 @@ from ...common.checks import Vector
 from .. import rotation as rotations
 from ..surface import HalfSpace, Surface, is_along, is_on_axis
 
-# Tangent planes around an axis that stand in for a surface of revolution where a volume's bounds are sought.
+# The number of tangent planes around an axis that replace a surface of revolution when a volume's bounds are sought.
 _TANGENTS = 8
 
 
@@ -21,7 +21,7 @@ class Revolved(Surface):
     center: Vector
 
     def turn(self) -> rotations.Quaternion | None:
-        """From that frame to the scene's."""
+        """The rotation from that frame to the scene's."""
         return rotations.after(self.rotation, rotations.onto(self.axis))
 
     def direction(self) -> Vector:
@@ -38,7 +38,7 @@ class Revolved(Surface):
         return is_along(self.direction(), axis) and is_on_axis(self.center, axis, center)
 
     def is_upright(self, across: int) -> bool:
-        """Whether its axis is along that axis of the scene."""
+        """Whether the axis of revolution is along the axis `across` of the scene."""
         x, y, z = np.eye(3)[across].tolist()
         return is_along(self.direction(), (x, y, z))
 
@@ -47,7 +47,7 @@ class Revolved(Surface):
 
 
 def tangents(axis: Vector, through: Vector, lean: float, offset: float) -> list[HalfSpace]:
-    """Half-spaces (u + lean axis).(r - through) <= offset for directions u all around a unit vector."""
+    """Return half-spaces (u + lean axis).(r - through) <= offset for directions u all around a unit vector."""
     frame = rotations.matrix(rotations.onto(axis))
     found = []
     for angle in np.linspace(0.0, 2.0 * math.pi, _TANGENTS, endpoint=False):

@@ -54,7 +54,7 @@ class Slab(Surface):
         return self.half_width
 
     def bounds(self) -> Box:
-        # Along its normal it reaches h, along any other direction to infinity.
+        # A plate reaches h along its normal, and infinitely far along any other direction.
         nx, ny, nz = turned(self.rotation, self.normal)
         tilts = math.hypot(ny, nz), math.hypot(nz, nx), math.hypot(nx, ny)
         hx, hy, hz = (self.half_width if tilt <= TILT else math.inf for tilt in tilts)
@@ -76,8 +76,8 @@ class Slab(Surface):
 
 # --- The normal: along an axis it costs no multiplication ------------------------------------------------
 
-# So each axis is a kind of its own: with a vector for all an impact in a box takes half as long again, and a third in a
-# fall that loses energy.
+# So each axis is a class of its own: with a vector for every normal an impact in a box takes half as long again, and a
+# third longer in a fall that loses energy.
 
 
 class Along(Record):
@@ -88,11 +88,11 @@ class Along(Record):
     axis = 0
 
     def part(self, r):
-        """Its component of a vector."""
+        """The component of a vector along the axis."""
         return r[self.axis]
 
     def scaled(self, k):
-        """It times a number."""
+        """The axis times a number."""
         return Vec(*(k if i == self.axis else 0.0 for i in range(3)))
 
 
@@ -117,7 +117,7 @@ Normal = Vec | AlongX | AlongY | AlongZ
 
 
 def normal_of(vector: Sequence[float]) -> Any:
-    """A unit vector as kernels take it, or the opposite one where that is an axis."""
+    """Return the normal of `SlabNumbers` from a unit vector: its opposite is as good along an axis."""
     for axis, others in zip(AXES, ((1, 2), (2, 0), (0, 1)), strict=True):
         if not any(vector[k] for k in others):
             return axis(1.0)
@@ -128,7 +128,7 @@ def normal_of(vector: Sequence[float]) -> Any:
 
 
 class SlabNumbers(Distance, ExactChord):
-    """A slab as kernels take it."""
+    """The numbers of a slab."""
 
     normal: Normal
     offset: float  # n.c
@@ -182,7 +182,7 @@ class SlabNumbers(Distance, ExactChord):
 
     def first_hit(self, r, v):
         d, u = self.off(r), self.along(v)
-        # Between the walls the one ahead, outside of them the one on the side where the flight comes from
+        # Between the walls the wall ahead; outside of them the wall on the side where the flight comes from
         time = (self.side * math.copysign(self.radius, u) - d) / u
         meets = select(self.side > 0.0, abs(u), -d * u) > 0.0
         return select(meets, select(time > 0.0, time, 0.0), math.inf), True
@@ -192,14 +192,14 @@ class SlabNumbers(Distance, ExactChord):
         d = self.off(r)
         sign = math.copysign(0.5, d)
         b, a = sign * self.along(v), sign * self.along(pull)
-        # Between them the far one too
+        # Between the walls the far one too
         far = rise_time(-abs(d) - self.radius, -b, -a)
         return select((self.side > 0.0) & (far < near), far, near), True
 
     def entry(self, gravity, r, v):
         if gravity is None:
             return self.first_hit(r, v)
-        # The wall on the side where a fall begins, of a plate the only one: a plane
+        # The wall on the side where a fall begins, which for a plate is the only one: a plane
         d = self.off(r)
         sign = math.copysign(0.5, d)
         b, a = sign * self.along(v), sign * self.along(gravity)
@@ -212,7 +212,7 @@ class SlabNumbers(Distance, ExactChord):
     def reach(self, lease):
         x, u, a = self.off(lease.r), self.along(lease.v), 0.5 * self.along(lease.a)
         width = lease.width if lease.axis is None else lease.width * abs(self.along(lease.axis))
-        # To the wall on the one side and on the other; of a plate the particle is on one side.
+        # To the wall on either side; of a plate the particle is on one side.
         up = rise_time(self.side * (x - self.radius), 0.5 * (self.side * u + width), self.side * a)
         down = rise_time(self.side * (-x - self.radius), 0.5 * (-self.side * u + width), -self.side * a)
         outside = select(x > 0.0, up, down)
@@ -256,7 +256,7 @@ class SlabNumbers(Distance, ExactChord):
         d = 2.0 * self.off(r) + self.along(p)
         return self.scaled(math.copysign(1.0, self.side * d))
 
-    # --- Of walls that move other than uniformly ---
+    # --- Walls that move other than uniformly ---
 
     def hessian_bounds(self, r):
         # H = n n^T
@@ -264,14 +264,14 @@ class SlabNumbers(Distance, ExactChord):
 
     @property
     def has_levels(self):
-        # Between its planes; of a solid there is one.
+        # Between its planes; a solid has one plane.
         return self.side > 0.0
 
     def level_along(self, seen):
-        # Of the two planes: a bound of the third derivative of the square would be ten times as far from it.
+        # The levels of both planes: a bound of the third derivative of the square would be ten times as wide.
         half = 0.5 * self.along(seen.v)
         x, bend = self.off(seen.r), 0.5 * self.along(seen.a)
-        # Without a speed the plane behind is the near one, from which it leaves.
+        # Without a speed the nearer plane is the one behind, which the particle leaves.
         sign = math.copysign(1.0, select(half == 0.0, -x, half))
         return Between(sign * x, abs(half), sign * bend, self.radius)
 
@@ -284,9 +284,9 @@ class SlabNumbers(Distance, ExactChord):
         middle, width = -x * inverse, CORE * self.radius - depth
         inverse = abs(inverse)
         half, hits = select(width > 0.0, width, 0.0) * inverse, middle + self.radius * inverse
-        # Outwards from beyond the mean wall it is met some time later, if at all: a guess.
+        # Outwards from beyond the mean wall the hit is some time later, if at all: a guess.
         hits = select(moves, select(hits > 0.0, hits, hits + depth * inverse), math.inf)
-        # A particle faster than the wall comes nearer to one plane all the time, and leaves the other.
+        # A particle faster than the wall approaches one plane all the time, and recedes from the second.
         return Passage(middle - half, middle + half, hits, CORE * abs(u) > speed)
 
     def moving_step(self, seen, longest):
@@ -300,6 +300,6 @@ class SlabNumbers(Distance, ExactChord):
 
 
 def slab_numbers(normal: Vector, half: float, center: Vector, side: float) -> SlabNumbers:
-    """The numbers of a slab across the unit vector `normal`, as the scene sees it."""
+    """Return the numbers of a slab across the unit vector `normal`, as seen in the scene."""
     made = SlabNumbers(normal_of(normal), 0.0, half, half * half, side)
     return made._replace(offset=float(made.along(vec(center))))

@@ -1,6 +1,6 @@
-"""A solid body with edges: what its parts have in common; phi is the largest of the parts' phi, and inner function.
+"""A solid body with edges: an intersection of parts; phi, its own inner function, is the largest phi of the parts.
 
-A part is a wall with its admissible side outside. The body is hit when the flight is inside of all parts.
+A part is a wall with its admissible side outside. A flight hits the body when it is inside of all parts.
 """
 
 import math
@@ -23,7 +23,7 @@ _ULPS = 32.0
 
 
 class SolidNumbers(contract.Smooth):
-    """A body as kernels take it: its parts, and a length that bounds the round-off of their coordinates."""
+    """The numbers of a body: its parts, and a length that bounds the round-off of their coordinates."""
 
     parts: tuple[Any, ...]
     side: float
@@ -55,7 +55,7 @@ class SolidNumbers(contract.Smooth):
         return longest
 
     def unit_normal(self, r):
-        # That of the part which the point is least deep in
+        # The gap and the normal of the part in which the point is least deep
         least, normal = math.inf, ZERO
         for part in reversed(self.parts):
             depth = part.distance(r)
@@ -64,22 +64,22 @@ class SolidNumbers(contract.Smooth):
         return normal
 
     def far(self, r):
-        # How far the point is out of the part that it is farthest from.
+        # The distance of the point from the part that it is farthest out of
         clear = 0.0
         for part in reversed(self.parts):
             clear = max(part.out_of(r), clear)
         return clear
 
     def farthest_push(self):
-        # phi is about the distance, and its faces are flat or wide: no pole within a push.
+        # phi is about the distance, and the faces are flat or wide: no pole within a push.
         return -math.inf
 
     def moving_step(self, seen, longest):
-        # Of the part that the particle is least deep in: outside of one part is outside of the body.
+        # The step to the part in which the particle is least deep: outside of one part is outside of the body.
         found = LevelStep(math.inf, 0.0, 0.0)
         for part in reversed(self.parts):
             here = part.moving_step(seen, longest)
-            # Of a part that the particle is inside of nothing is known; on its face the sign of the approach decides.
+            # A part that the particle is inside of gives no bound; on its face the sign of the approach decides.
             depth = part.gap_of(part.inner(seen.r))
             time = select(depth > noise(part, self.extent, seen.r), 0.0, here.time)
             least = here.level < found.level
@@ -89,11 +89,11 @@ class SolidNumbers(contract.Smooth):
 
 
 def body(parts: Sequence[Any], extent: float = 0.0) -> SolidNumbers:
-    """The intersection of parts, each the numbers of a wall that is admissible outside of the part.
+    """Return the intersection of parts, each the numbers of a wall that is admissible outside of the part.
 
     Args:
-        parts: numbers of walls with side -1, or of planes: their part is where normal.r > offset.
-        extent: distance from the origin within which the parts' centres lie [m], where that is far.
+        parts: numbers of walls with side -1, or of planes: the part is then the half-space normal.r > offset.
+        extent: the distance from the origin within which the centres of the parts lie [m], if that is far.
     """
     return SolidNumbers(tuple(parts), -1.0, float(extent))
 
@@ -102,13 +102,13 @@ def body(parts: Sequence[Any], extent: float = 0.0) -> SolidNumbers:
 
 
 def _largest(parts, r):
-    """The largest phi of the parts, and its gradient."""
+    """Return the largest phi of the parts, and its gradient."""
     most, gradient = -math.inf, ZERO
     for part in reversed(parts):
-        # phi of a part rises out of it, that of a plane into it.
+        # phi of a part rises outwards, phi of a plane into the part.
         sign = -part.side
         here = sign * part.phi(r)
-        # No select: these may be arrays.
+        # No select: these may be arrays
         use = 1.0 * (here >= most)
         most = np.maximum(here, most)
         gradient = (use * sign) * part.gradient(r) + (1.0 - use) * gradient
@@ -116,7 +116,7 @@ def _largest(parts, r):
 
 
 def _bend_of_largest(parts, r, h):
-    """The largest phi of the parts, and half its second derivatives, by differences."""
+    """Return the largest phi of the parts, and half its second derivatives, by differences."""
     most, bend = -math.inf, Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for part in reversed(parts):
         sign = -part.side
@@ -130,31 +130,31 @@ def _bend_of_largest(parts, r, h):
 
 
 class Entering(Approach):
-    """The steps of a flight until it is inside of all parts, each to where one is still to be entered, or again."""
+    """The steps of a flight until it is inside of all parts; each step leads to where one part is entered (again)."""
 
-    # What is not found by then goes on in the next pass.
+    # A flight that needs more steps continues in the next pass.
     most = 99
 
     def first_step(self):
         return self.next_step(0.0, math.inf)
 
     def step_from(self, p, w, last):
-        # Until the last of the parts is entered the flight is outside of that one; by then it may have left another.
+        # Until the flight enters the last of the parts it is outside of that one; by then it may have left another.
         body, gravity = self.surface, self.gravity
         wait, found = _last_entry(body.parts, gravity, body.extent, p, w)
         moved = total(absolute(displacement(gravity, w, wait)))
-        # The place is known to round-off of its own coordinates and of those the flight comes from.
+        # The place is known to round-off of its own coordinates and of the coordinates of the start.
         coordinates = total(absolute(p)) + abs(self.r.x) + abs(self.r.y) + abs(self.r.z)
         is_in = found & (moved <= 4.0 * EPSILON * (coordinates + body.extent))
         return wait, select(is_in, 0.0, select(wait > 0.0, wait, TINY))
 
 
 def _last_entry(parts, gravity, extent, r, v):
-    """When the last of the parts is entered that the particle is not inside of: (time, whether it is then)."""
+    """Return (when the last part is entered that the particle is not inside of, whether it is entered)."""
     time, found = 0.0, True
     for part in reversed(parts):
         here, found_here = part.entry(gravity, r, v)
-        # On the face of a part, which is left or entered now, the sign of the approach decides.
+        # On the face of a part, which the particle now leaves or enters, the sign of the approach decides.
         depth = part.gap_of(part.inner(r))
         later = (here > time) & (not (depth > noise(part, extent, r)))
         time, found = select(later, here, time), select(later, found_here, found)
@@ -162,7 +162,7 @@ def _last_entry(parts, gravity, extent, r, v):
 
 
 def noise(part, extent, r):
-    """The round-off of the gap of a part."""
+    """Return the round-off of the gap of a part."""
     gradient = total(absolute(part.gradient(r)))
     terms = part.gap_scale(r) + extent * gradient + abs(part.gap_of(0.0))
     return _ULPS * EPSILON * terms

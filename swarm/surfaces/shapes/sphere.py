@@ -15,7 +15,7 @@ from ..time_of_impact.course import Quartic, ball_rise_time, level_and_window, r
 from ..time_of_impact.rising import Bounds, Level, passage_of
 from .common import Distance, ExactChord
 
-# How often the time is tried for which a fall is bounded.
+# How often the time in which a fall is bounded is tried.
 _TRIALS = 3
 
 
@@ -48,7 +48,7 @@ class Sphere(Surface):
         return kind(vec(self.center), self.radius, self.radius**2, side / self.radius, side)
 
     def walls(self) -> tuple["SphereNumbers"]:
-        return (self.numbers(),)  # whatever its rotation
+        return (self.numbers(),)  # for any rotation
 
     def largest_ball(self) -> float:
         return math.inf if self.is_solid() else self.radius
@@ -81,13 +81,13 @@ class Sphere(Surface):
 
 
 def _risen(d, p):
-    """2 d.p, and |d + p|^2 - |d|^2."""
+    """Return 2 d.p, and |d + p|^2 - |d|^2."""
     dp = 2.0 * dot(d, p)
     return dp, dp + p.x * p.x + p.y * p.y + p.z * p.z
 
 
 class SphereNumbers(Distance, ExactChord):
-    """A sphere as kernels take it; a ball may be small compared with the distance of a flight from it."""
+    """The numbers of a sphere; a ball may be small compared with the distance where a flight begins."""
 
     center: Vec
     radius: float
@@ -141,13 +141,13 @@ class SphereNumbers(Distance, ExactChord):
         d, side = r - self.center, self.side
         c, b, a, gg = square(d) - self.radius2, dot(d, v), square(v), square(pull)
         a2 = a + d.x * pull.x + d.y * pull.y + d.z * pull.z
-        # Outside, the size is that of the distance: the flight may begin far from a ball.
+        # Outside, the size is the distance: the flight may begin far from a ball.
         size = self.radius2 + select(c > 0.0, c, 0.0)
         c, window = level_and_window(c, self.radius2, size, a, gg)
         return Quartic(side * c, side * b, side * a2, side * dot(v, pull), side * 0.25 * gg, window)
 
     def reach(self, lease):
-        # |d + v t| = R -+ width t, with the fall up to a time in the width
+        # |d + v t| = R -+ width t, where the width includes the fall up to a time
         d, side, weight = lease.r - self.center, self.side, norm(lease.a)
         c, b, a = side * (square(d) - self.radius2), side * dot(d, lease.v), square(lease.v)
         time, within = 0.0, lease.longest
@@ -192,11 +192,11 @@ class SphereNumbers(Distance, ExactChord):
         return free / (4.0 * self.radius2 + dp)
 
     def chord_normal(self, r, p, kappa):
-        # r1 = [(1 - kappa) r0 + p]/(1 + kappa), so r0 + r1 is parallel to 2 r0 + p whatever kappa is.
+        # r1 = [(1 - kappa) r0 + p]/(1 + kappa), so r0 + r1 is parallel to 2 r0 + p for any kappa.
         n = 2.0 * (r - self.center) + p
         return n * (self.side / norm(n))
 
-    # --- Of walls that move other than uniformly ---
+    # --- Walls that move other than uniformly ---
 
     def hessian_bounds(self, r):
         # H = 1
@@ -208,11 +208,11 @@ class SphereNumbers(Distance, ExactChord):
         return Level(side * (q - self.radius2), side * dot(d, seen.v), side * bend, *self._steepness(q))
 
     def _steepness(self, q):
-        """|grad q|, the magnitude of H, and whether |grad q| may grow before a flight meets the wall."""
+        """Return |grad q|, the magnitude of H, and whether |grad q| may grow before a flight meets the wall."""
         return 2.0 * math.sqrt(q), 1.0, True
 
     def bounds_along(self, seen, within):
-        # In a frame that its centre carries along: it does not turn.
+        # In a frame that moves with the centre and does not turn
         drive = seen.drive
         spin, arm = drive.angular_speed(), norm(self.center - drive.center)
         return Bounds(
@@ -244,10 +244,10 @@ class SphereCavity(SphereNumbers):
 
 
 def ball(center, radius):
-    """The numbers of a solid sphere."""
+    """Return the numbers of a solid sphere."""
     return SphereNumbers(center, radius, radius * radius, -1.0 / radius, -1.0)
 
 
 def cavity(center, radius):
-    """The numbers of a cavity that is a sphere."""
+    """Return the numbers of a spherical cavity."""
     return SphereCavity(center, radius, radius * radius, 1.0 / radius, 1.0)

@@ -21,13 +21,13 @@ from ..surface import TILT, Box, Surface, box_around, farthest, is_along, is_on_
 from ..time_of_impact.approach import LevelBound
 from .common import Distance
 
-# Points around the tube and along it, of triangles.
+# The points around the tube and along it, of its triangles
 _AROUND, _ALONG = 32, 96
-# The last step leaves this part of 4 R^2 a^2, what F is in the middle of the tube.
+# The last step leaves this part of 4 R^2 a^2, the value of F in the middle of the tube.
 _CLOSE = 4e-16
-# From farther than the root of this many times its size a flight to the ball around it first goes so much nearer.
+# A flight from farther than the root of this many times the size of the ball around it first goes to a wider ball.
 _AFAR = 1024.0
-# Squares: of a ball around the torus, in its radii, within which its own level is asked, and of one in that.
+# Squared radii, in those of the ball around the torus: beyond the first a flight goes to the second before the torus.
 _OUTER, _NEARER = 1.3, 1.1
 
 
@@ -89,7 +89,7 @@ class Torus(Surface):
         upright = abs(turned(self.rotation, (0.0, 0.0, 1.0))[across])
         if self.center[across] != 0.0 or TILT < upright < 1.0 - TILT:
             return None
-        # Across its axis a ring, else two discs
+        # Across its axis a ring, otherwise two discs
         return 4.0 * math.pi * self.major_radius * self.minor_radius if upright > TILT else 2.0 * section
 
     def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
@@ -98,7 +98,7 @@ class Torus(Surface):
         return [AreaSample(4.0 * math.pi**2 * self.major_radius * self.minor_radius, self._points)]
 
     def _points(self, random: Any, n: int) -> Floats:
-        """Points uniform in its area: the nearer to its axis, the less area."""
+        """Return points that are uniform in the section's area: it has less area near the axis."""
         large, small = self.major_radius, self.minor_radius
         tube = np.empty(0)
         while len(tube) < n:
@@ -111,7 +111,7 @@ class Torus(Surface):
         return np.asarray(np.array(self.center)[:, None] + turn @ points)
 
     def triangulated(self, low: Floats, high: Floats, frame: Floats) -> Triangles:
-        # A thin tube would be lost between the points of a grid.
+        # A grid of points would lose a thin tube between them.
         u, v = (np.linspace(0.0, 2.0 * math.pi, count, endpoint=False) for count in (_ALONG, _AROUND))
         along, around = np.meshgrid(u, v, indexing="ij")
         rho = self.major_radius + self.minor_radius * np.cos(around)
@@ -123,7 +123,7 @@ class Torus(Surface):
 
 
 class TorusNumbers(Distance):
-    """A torus as kernels take it, about the z axis."""
+    """The numbers of a torus about the z axis."""
 
     center: Vec
     major: float
@@ -151,14 +151,14 @@ class TorusNumbers(Distance):
         across = d.x * both.x + d.y * both.y
         return across * (1.0 - 2.0 * self.major / (rho0 + rho1)) + d.z * both.z
 
-    # Of the same sign as the gap is F = (|d|^2 + R^2 - a^2)^2 - 4 R^2 rho^2 = (q - a^2) (q - a^2 + 4 R rho), along a
-    # flight a polynomial of degree 4, or 8 in a fall. F, F'/2 and F''/2 are written without what cancels on the wall.
+    # F = (|d|^2 + R^2 - a^2)^2 - 4 R^2 rho^2 = (q - a^2) (q - a^2 + 4 R rho) has the sign of the gap. Along a flight it
+    # has degree 4, or 8 in a fall. F, F'/2 and F''/2 are written without terms that cancel on the wall.
 
     def near(self, gravity, r, v):
         return self._near(r, v) if gravity is None else self._near_of_fall(as_vector(gravity), r, v)
 
     def hessian_bounds(self, r):
-        # Half way to the axis at most, where 1 - R/rho is largest.
+        # At most half the way to the axis, where 1 - R/rho is largest
         rho = self._from_axis(r)
         along = 2.0 * self.major / rho
         return select(self.side > 0.0, 1.0, along - 1.0), 1.0 + along, 0.5 * rho
@@ -168,11 +168,11 @@ class TorusNumbers(Distance):
         return (self.side < 0.0) & (dot(d, v) >= 0.0) & (square(d) > wide * wide)
 
     def farthest_push(self):
-        # Where I + kappa H has its first pole: along the inner equator of a cavity, across the tube of a solid.
+        # The first pole of I + kappa H: along the inner equator of a cavity, across the tube of a solid.
         return select(self.side > 0.0, self.major / self.radius - 1.0, -1.0)
 
     def _from_axis(self, r):
-        """rho, never 0: on the axis the direction to the tube is not defined."""
+        """Return rho, never 0: on the axis the direction to the tube is not defined."""
         d = r - self.center
         return np.maximum(np.sqrt(d.x * d.x + d.y * d.y), TINY)
 
@@ -206,7 +206,7 @@ class TorusNumbers(Distance):
         across = rho - major
         q, d2 = across * across + d.z * d.z, square(d)
         tube2 = self.near_radius2(q)
-        # |d + v t + G t^2/2|^2 by powers of t, and that of its components across the axis
+        # |d + v t + G t^2/2|^2 by powers of t, and the same for the components across the axis
         bp, p2 = d.x * v.x + d.y * v.y, v.x * v.x + v.y * v.y + d.x * g.x + d.y * g.y
         bz, z2 = d.z * v.z, v.z * v.z + d.z * g.z
         b, s2 = bp + bz, p2 + z2
@@ -234,10 +234,10 @@ class TorusNumbers(Distance):
         )  # fmt: skip
 
     def _ball(self, d2):
-        """Whether a solid is within a ball that a point is outside of; the square radius of one that is nearer to it.
+        """Return whether a point is far from a solid, and the square radius of a ball around it to go to first.
 
-        To that ball the level is a quartic, or a parabola. Outside of it a cavity is not admissible, where soft walls
-        let a particle be.
+        To this ball the level is a quartic, or a parabola. A cavity has none: its outside is not admissible, though
+        soft walls let a particle be there.
         """
         wide2 = self.major + self.radius
         wide2 = wide2 * wide2

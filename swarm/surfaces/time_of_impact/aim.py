@@ -117,7 +117,7 @@ def _first_wave(walls):
 
 
 def _known_drives(walls):
-    """Return the motions whose waves are kept: all, if a lane has the rows."""
+    """Return the motions with waves that are kept: all, if a lane has the rows."""
     drives = walls.drives()
     count = sum(len(drive.rates()) for drive in drives)
     return drives if count <= len(walls.each) * _WAVES else ()

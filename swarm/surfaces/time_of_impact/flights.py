@@ -75,7 +75,7 @@ def union_hit(walls, rooms, hits, gravity, flight, stops=False):
 
 
 def soonest(hit, number, later):
-    """Return the sooner of two hits: with the field whose first wall has this number, and with a later wall."""
+    """Return the sooner of two hits: with the field that begins at this wall number, and with a later wall."""
     first = hit.time <= later.time
     wall = select(hit.wall < 0.0, -1.0, hit.wall + number)
     return Hit(select(first, hit.time, later.time), select(first, wall, later.wall))
@@ -211,7 +211,7 @@ def aimed(walls, gravity, course, row, lane, is_last):
 
 
 def step_off(walls, gravity, course, row, lane, r, v):
-    """Take the first safe step of a fall to each wall whose hit no guess has led to."""
+    """Take the first safe step of a fall to each wall to which no guess has led."""
     for k, wall in enumerate(walls.each):
         if _is_aimed(wall, gravity):
             at = row + k * COURSE

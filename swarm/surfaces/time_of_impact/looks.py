@@ -1,4 +1,4 @@
-"""First hits with a wall whose level has bounds of half its second derivatives that hold everywhere.
+"""First hits with a wall that has bounds of half its level's second derivatives, the same everywhere.
 
 Lanes look together; a single flight ends its looks when it can.
 """

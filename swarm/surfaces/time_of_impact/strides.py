@@ -1,4 +1,4 @@
-"""Safe steps in lanes, to walls in any motion whose levels have a bound of their third derivative.
+"""Safe steps in lanes, to walls in any motion with levels that have a bound of their third derivative.
 
 A stride is one safe step of all walls together. Its bounds hold until the parabola of a level itself rises: near the
 hit the part of f''' that is not known is the only error, and a stride leaves the cube of its length. A hit that a few
