@@ -1,7 +1,7 @@
-"""The code of a surface by functions: frozen copies of them, and a class of numbers that is named by their digest.
+"""The code of a surface by functions: frozen copies of them, and a class of numbers with their digest as its name.
 
-Kernels are compiled for a class and found in the cache by its name. What is compiled is the frozen copy, and the digest
-covers all it refers to: after an edit anywhere, or when a global changes, the class is another one.
+Kernels are compiled for a class and found in the cache by its name. The frozen copy is compiled, and the digest covers
+all it refers to: after an edit anywhere, or when a global changes, the class is another one.
 """
 
 import collections
@@ -32,7 +32,7 @@ def class_of(
 ) -> Any:
     """The class of numbers by which kernels call these functions; `along` are the coefficients of phi along flights.
 
-    The first function is that of straight flights, the second that of falls.
+    The first of `along` is for straight flights, the second for falls.
 
     Raises:
         SceneError: they are not functions of (parameters, x, y, z), or the parameters are no NamedTuple of numbers.
@@ -78,9 +78,9 @@ def _methods(
     along: Function | None = None,
     along_fall: Function | None = None,
 ) -> dict[str, Function]:
-    """The methods of the class of numbers."""
+    """Return the methods of the class of numbers."""
     value, slope = _taking_arrays(phi, 1), _taking_arrays(gradient, 3)
-    # A class of the user's is not found by another process: the functions get their parameters in one that is.
+    # Another process does not find a user's own class: the functions get their parameters as a class that it finds.
     make = collections.namedtuple("Parameters", names)  # type: ignore[misc]
 
     def own(surface):
@@ -118,7 +118,7 @@ def _methods(
 
 
 def _taking_arrays(function: Function, count: int) -> Function:
-    """The function, of `count` results, which in plain Python takes arrays of points too, whatever it is made of."""
+    """Return the function, of `count` results, which in plain Python takes arrays of points too, however written."""
     takes_arrays: list[bool] = []
 
     def in_python(parameters, x, y, z):
@@ -135,7 +135,7 @@ def _taking_arrays(function: Function, count: int) -> Function:
 
 
 def _one_by_one(function: Function, count: int, parameters: Any, *rows: Any) -> Any:
-    """The function at one point at a time; NaN where it has no value."""
+    """Call the function at one point at a time; NaN where it has no value."""
     nothing = np.nan if count == 1 else (np.nan,) * count
 
     def at(*point: Any) -> Any:
@@ -151,7 +151,7 @@ def _one_by_one(function: Function, count: int, parameters: Any, *rows: Any) -> 
 
 
 def _takes_arrays(function: Function, count: int, parameters: Any, *rows: Any) -> bool:
-    """Whether the function computes with arrays what it computes with numbers, and leaves its arguments alone."""
+    """Whether the function computes the same with arrays as with numbers, and leaves its arguments unchanged."""
     few = [np.resize(row, 3) for row in np.broadcast_arrays(*rows)]
     for row in few:
         row.flags.writeable = False
@@ -160,5 +160,5 @@ def _takes_arrays(function: Function, count: int, parameters: Any, *rows: Any) -
             whole = function(parameters, *few)
             together = np.broadcast_arrays(*(whole if count > 1 else (whole,)), few[0])[:count]
             return np.allclose(together, _one_by_one(function, count, parameters, *few), rtol=1e-9, equal_nan=True)
-    except Exception:  # Whatever it was: one point at a time will say it.
+    except Exception:  # Any error: a call at one point at a time reports it.
         return False

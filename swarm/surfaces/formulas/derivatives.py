@@ -19,20 +19,20 @@ from .interval import IntervalBoxes, check_constants, check_smooth
 from .numbers import Bend
 from .series import DEGREE, HALF_PULL, VELOCITY, LevelSeries
 
-# Operations of the derivatives: beyond, deriving and compiling them would take minutes.
+# The most operations of the derivatives: beyond, to derive and compile them would take minutes.
 _MOST_OPERATIONS = 4000
 # Cells along an edge of the box, for the bounds of the second derivatives.
 _CELLS = 16
-# A cavity is looked for in cubes with these powers of 2 as half widths [m].
+# The search for a cavity is in cubes with these powers of 2 as half widths [m].
 _SMALLEST, _LARGEST = -40, 24
-# The box is found by cutting layers off its sides, each this part of it, of so many cells along an edge; of a cube in
-# which a cavity is looked for, so many.
+# The box is found by cutting layers off its sides, each this part of it, of this number of cells along an edge; a cube
+# in which a cavity is sought has the last number of cells.
 _LAYERS, _LAYER_CELLS, _CUBES = tuple(0.5**k for k in range(2, 11)), 24, 8
-# The third derivatives: an entry of H, the axis by which it is differentiated, and in how many orders each occurs.
+# The third derivatives: an entry of H, the axis of the differentiation, and the number of orders in which each occurs.
 _THIRDS = (
     (0, 0, 1), (1, 1, 1), (2, 2, 1), (0, 1, 3), (0, 2, 3), (1, 0, 3), (1, 2, 3), (2, 0, 3), (2, 1, 3), (3, 2, 6)
 )  # fmt: skip
-# A factor above the round-off of the sum of their squares.
+# A factor above the round-off of the sum of their squares
 _UPWARDS = 1.0 + 1e-12
 # Room around the box that was found, relative to it.
 _ROOM = 1e-3
@@ -40,7 +40,7 @@ _ROOM = 1e-3
 
 @functools.lru_cache(maxsize=64)
 def derived(text: str, names: tuple[str, ...]) -> "Derived":
-    """The formula and its derivatives, as expressions and as functions."""
+    """Return the formula and its derivatives, as expressions and as functions."""
     import sympy
 
     pieces: list[NonSmoothTerm] = []
@@ -75,10 +75,10 @@ class Derived(NamedTuple):
     axes: tuple[Any, ...]
     functions: tuple[Any, ...]
     along: Any  # the function of the coefficients of a polynomial along a straight flight, or None
-    along_fall: Any  # the same along a fall, for degrees 3 and 4; else None
+    along_fall: Any  # the function for a fall, for degrees 3 and 4; else None
 
     def with_values(self, values: tuple[float, ...]) -> "Derived":
-        """The expressions with numbers in place of the parameters."""
+        """Return the expressions with numbers in place of the parameters."""
         import sympy
 
         numbers = {sympy.Symbol(f"p{i}"): sympy.Rational(value) for i, value in enumerate(values)}
@@ -88,7 +88,7 @@ class Derived(NamedTuple):
         return self._replace(phi=self.phi.subs(numbers), gradient=gradient, hessian=hessian, pieces=pieces)
 
     def found_box(self) -> Box | None:
-        """A box that surely holds all of phi <= 0 up to the largest cube; None if that is open.
+        """Return a box that surely holds all of phi <= 0 up to the largest cube; None if the cavity is open.
 
         A formula that lacks a coordinate is a cylinder: the box has no ends along that axis.
         """
@@ -102,7 +102,7 @@ class Derived(NamedTuple):
         raise SceneError("phi must be 0 somewhere, got above 0 everywhere")
 
     def _tightened(self, half: float, across: list[int]) -> Box:
-        """The cube without the layers that surely hold none of phi <= 0, cut off along the axes `across`."""
+        """Return the cube without the layers that surely hold none of phi <= 0, cut off along the axes `across`."""
         box = np.array([[-half] * 3, [half] * 3])
         for part in _LAYERS:
             for axis, end in itertools.product(across, range(2)):
@@ -136,7 +136,7 @@ class Derived(NamedTuple):
         return any(one.free_symbols for one in self.hessian)
 
     def is_convex(self, side: str) -> bool:
-        """Whether the formula is a quadric of which this side is surely convex."""
+        """Whether the formula is a quadric that is surely convex on this side."""
         return not self._varies() and self._constant_bend(side_sign(side)).least > 0.0
 
     def _constant_bend(self, side: float) -> Bend:
@@ -144,7 +144,7 @@ class Derived(NamedTuple):
         return Bend.of_entries(entries, entries)._replace(third=0.0)
 
     def bend(self, form: Form) -> Bend:
-        """Bounds of side H over the box of a form, a solid's with its margin.
+        """Return the bounds of side H over the box of a form, for a solid with its margin.
 
         Raises:
             SceneError: H is not bounded there.
@@ -153,7 +153,7 @@ class Derived(NamedTuple):
         if not self._varies():
             return self._constant_bend(side)
         cells = IntervalBoxes.grid(self.axes, form.domain(), (_CELLS, _CELLS, _CELLS))
-        # Flights are in the admissible part only, so its cells are enough.
+        # Flights are in the admissible part only, so the cells of this part are enough.
         admissible = cells.may_be_admissible(self.phi, side)
         parts = [cells.bounds(one) for one in self.hessian]
         ends = [(part.low, part.high) if side > 0.0 else (-part.high, -part.low) for part in parts]
@@ -170,8 +170,8 @@ class Derived(NamedTuple):
         import sympy
 
         if self.along is not None:
-            return math.inf  # a flight to a polynomial does not ask
-        # d^3 phi/dx_i dx_j dx_k, and how often it occurs among all
+            return math.inf  # a flight to a polynomial does not need it
+        # d^3 phi/dx_i dx_j dx_k, and the number of its occurrences among all
         thirds = [(2 * sympy.diff(self.hessian[h], self.axes[k]), count) for h, k, count in _THIRDS]
         if int(sympy.count_ops([one for one, _count in thirds])) > _MOST_OPERATIONS:
             return math.inf
@@ -183,12 +183,12 @@ class Derived(NamedTuple):
 
 
 def _shape(along: list[int], cells: int) -> list[int]:
-    """So many cells along some axes, one along others."""
+    """Return `cells` along some axes, and 1 along all others."""
     return [cells if k in along else 1 for k in range(3)]
 
 
 def _layer(box: Any, axis: int, end: int, part: float) -> Any:
-    """The part of a box along one of its sides."""
+    """Return the part of a box along one of its sides."""
     layer = box.copy()
     layer[1 - end, axis] = box[end, axis] + part * (box[1 - end, axis] - box[end, axis])
     return layer
@@ -198,7 +198,7 @@ def _layer(box: Any, axis: int, end: int, part: float) -> Any:
 
 
 def _function(name: str, rows: Sequence[Any]) -> Any:
-    """A function (p, x, y, z) of these expressions."""
+    """Return a function (p, x, y, z) of these expressions."""
     import sympy
 
     shared, rows = sympy.cse(rows, symbols=sympy.numbered_symbols("s"), order="none")
@@ -209,7 +209,7 @@ def _function(name: str, rows: Sequence[Any]) -> Any:
 
 
 def _along(phi: Any) -> Any:
-    """A function (p, x, y, z, u, v, w) of the coefficients of phi along a flight, None above degree 4."""
+    """Return a function (p, x, y, z, u, v, w) of the coefficients of phi along a flight, None above degree 4."""
     writer = _DerivativeWriter()
     found = LevelSeries(writer, falls=False).of(phi)
     if found is None:
@@ -221,7 +221,7 @@ def _along(phi: Any) -> Any:
 
 
 def _along_fall(phi: Any) -> Any:
-    """A function (p, x, y, z, u, v, w, a, b, c) of the same along a fall; (a, b, c) is half its acceleration."""
+    """Return such a function (p, x, y, z, u, v, w, a, b, c) for a fall; (a, b, c) is half its acceleration."""
     writer = _DerivativeWriter()
     found = LevelSeries(writer, falls=True).of(phi) or []
     function = _made("along_fall", (*COORDINATES, *VELOCITY, *HALF_PULL), writer, found)
@@ -230,7 +230,7 @@ def _along_fall(phi: Any) -> Any:
 
 
 def _made(name: str, arguments: Sequence[str], writer: "_DerivativeWriter", results: list[str]) -> Any:
-    """The function with the lines that a writer has."""
+    """Return the function with the lines of a writer."""
     lines = [f"def {name}(p, {', '.join(arguments)}):", *writer.lines, f"return {', '.join(results)}"]
     scope: dict[str, Any] = {"np": np, **_COMPUTED, "__name__": __name__}
     text = "\n    ".join(lines)
@@ -240,7 +240,7 @@ def _made(name: str, arguments: Sequence[str], writer: "_DerivativeWriter", resu
     return scope[name]
 
 
-# The functions that compute those of a formula: of those with one value by SymPy's names, and all of them.
+# The functions for those of a formula: for functions with one value by SymPy's names, and for all of them
 _OF_ONE = {"exp": "exponential", "log": "logarithm", "tanh": "hyperbolic_tangent"}
 _COMPUTED = {
     "sine_and_cosine": sine_and_cosine, "exponential": exponential, "logarithm": logarithm, "hyperbolic": hyperbolic,
@@ -252,11 +252,11 @@ class _DerivativeWriter:
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.known: dict[Any, str] = {}
-        # The names of the sine and the cosine of an argument, by what computes both.
+        # The names of the sine and the cosine of an argument, by the call that computes both
         self.sines: dict[tuple[str, str], tuple[str, str]] = {}
 
     def name_of(self, expression: Any) -> str:
-        """The name that holds an expression, or the number itself."""
+        """Return the name of the variable that holds an expression, or the number itself."""
         if expression not in self.known:
             self.known[expression] = self._written(expression)
         return self.known[expression]
@@ -315,7 +315,7 @@ class _DerivativeWriter:
 
 
 def _literal(number: Any) -> str:
-    """A constant as a float; in parentheses where it has a sign."""
+    """Return a constant as a float; in parentheses where it has a sign."""
     try:
         value = float(number)
     except (TypeError, ValueError, OverflowError):

@@ -1,7 +1,7 @@
-"""A formula from a scene file as an expression: a list of what is allowed, and an error for everything else.
+"""A formula from a scene file as an expression: a list of allowed nodes, and an error for every other one.
 
-Nothing in the text is ever evaluated: Python's parser only builds a tree of it, and every node of the tree that is on
-the list below becomes one of SymPy's.
+The text is never evaluated: Python's parser only builds a tree of it, and every node of the tree that is on the list
+below becomes a SymPy node.
 """
 
 import ast
@@ -18,10 +18,10 @@ COORDINATES = ("x", "y", "z")
 FUNCTIONS: dict[str, Callable[[float], float]] = {
     name: getattr(math, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh")
 }
-# Long enough for any surface that one writes down, short enough that its derivatives are.
+# Long enough for any surface that is written by hand, short enough for its derivatives.
 _LONGEST, _DEEPEST, _MOST_NODES = 2000, 60, 400
 _LARGEST_EXPONENT = 64.0
-# Numbers with squares and inverse squares that are numbers.
+# Numbers up to this have squares and inverse squares that are finite.
 _LARGEST = 1e150
 # Exact fractions longer than this are rounded, so that powers of powers stay short.
 _BITS = 1000
@@ -48,10 +48,10 @@ class NonSmoothTerm(NamedTuple):
 
 
 def parse(text: Any, parameters: Iterable[str] = (), pieces: list[NonSmoothTerm] | None = None) -> Any:
-    """The SymPy expression of a formula in x, y, z and `parameters`; their symbols are p0, p1, ... in their order.
+    """The SymPy expression of a formula in x, y, z and `parameters`; their symbols are p0, p1, ... in this order.
 
-    SymPy simplifies as it builds, so that sqrt(x**2)**2 becomes x**2. What is smooth only in places is appended to
-    `pieces` as it is read, inner ones first, whether or not anything of it is left.
+    SymPy simplifies as it builds, so that sqrt(x**2)**2 becomes x**2. Terms that are smooth only in places are appended
+    to `pieces` as they are read, inner ones first, even if simplification removes them.
 
     Raises:
         SceneError: the text is not a formula of numbers, these names, + - * / ** and the functions of the list.
@@ -78,7 +78,7 @@ def parse(text: Any, parameters: Iterable[str] = (), pieces: list[NonSmoothTerm]
 
 
 class _FormulaReader:
-    """The tree of one text, node by node."""
+    """A reader of the tree of one text, node by node."""
 
     def __init__(self, text: str, lead: int, names: dict[str, Any], sympy: Any, pieces: list[NonSmoothTerm]) -> None:
         self._text, self._lead, self._names, self._sympy, self._pieces = text, lead, names, sympy, pieces
@@ -87,7 +87,7 @@ class _FormulaReader:
     def expression(self) -> Any:
         try:
             with warnings.catch_warnings():
-                # Such as "invalid decimal literal", which come as errors below.
+                # Such as "invalid decimal literal": these come as errors below.
                 warnings.simplefilter("ignore")
                 tree = ast.parse(self._text, mode="eval")
         except SyntaxError as error:
@@ -98,7 +98,7 @@ class _FormulaReader:
         return self._read(tree.body, 0)
 
     def _read(self, node: ast.expr, depth: int) -> Any:
-        """The expression of a node."""
+        """Return the expression of a node."""
         self._nodes += 1
         if self._nodes > _MOST_NODES:
             raise SceneError(f"phi must have at most {_MOST_NODES} numbers, names and operations, got more")
@@ -138,7 +138,7 @@ class _FormulaReader:
             self._refuse(node, f"phi must have real numbers only, got {node.value!r:.40}")
         if not self._is_small(node.value):
             self._refuse(node, f"phi must have numbers below {_LARGEST:g} and not below {1 / _LARGEST:g}")
-        # As it is written, 0.09 and not the nearest binary fraction: 1/0.09 is rounded once.
+        # As it is written: 0.09 and not the nearest binary fraction, so that 1/0.09 is rounded once.
         return self._sympy.Rational(repr(node.value))
 
     def _name(self, node: ast.Name) -> Any:
@@ -183,7 +183,7 @@ class _FormulaReader:
         return getattr(self._sympy, node.func.id)(argument)
 
     def _computed(self, node: ast.expr, value: Callable[[], Any]) -> Any:
-        """A constant that is no fraction, rounded."""
+        """Return a constant that is no fraction, rounded."""
         try:
             number = value()
         except (TypeError, ValueError, ArithmeticError):
@@ -193,7 +193,7 @@ class _FormulaReader:
         return self._checked(node, self._sympy.Rational(number))
 
     def _checked(self, node: ast.expr, value: Any) -> Any:
-        """A result; constants are kept small and short."""
+        """Return a result; constants are kept small and short."""
         if not value.is_number:
             return value
         if not value.is_Rational:

@@ -1,4 +1,4 @@
-"""phi in its own coordinates and a box around its surface: what can be checked of it, and how much it bends there."""
+"""phi in its own coordinates and a box around its surface: checks of phi, and bounds of its second derivatives."""
 
 import functools
 import math
@@ -21,32 +21,32 @@ from ..curvature import matrices_of
 from ..surface import UNBOUNDED, Box, farthest, rotated_box, shown, side_sign, slopes_of
 from .numbers import Bend
 
-# Central differences lose least at the cube root of round-off, relative to the length.
+# Central differences are most exact with steps of the cube root of round-off, relative to the length.
 _DIFFERENCE = EPSILON ** (1.0 / 3.0)
-# Where second derivatives are only sampled: how many points, by how much their range is widened, and what they miss.
+# Where second derivatives are only sampled: the number of points, the factor that widens their range, the rest.
 _SAMPLES = 4096
 _SAFETY = 2.0
 _NOISE = 1e-6
-# Room around a solid, relative to its box's smallest width, within which the bound of the second derivatives holds.
+# The room around a solid, relative to its box's smallest width, within which the bound of the second derivatives holds
 _MARGIN = 0.25
-# Where a jump of phi is looked for: chords of the box in equal parts, and how often a part is cut in halves.
+# Where jumps of phi are sought: chords of the box, their equal parts, and the number of halvings of a part
 _CHORDS, _PARTS, _HALVINGS = 256, 16, 30
-# A given curvature is surely too small where the gradient says so by differences over a length and over twice it, which
-# agree: by this part of it, and beyond so much round-off of a gradient.
+# A given curvature is surely too small if differences of the gradient over a length and over twice the length both
+# exceed it: by this part of it, and by this number of round-offs of a gradient.
 _SURELY, _ROUND_OFF = 1e-3, 64.0
-# Points of a check that are moved onto the surface, and the moves.
+# The points of a check that are moved onto the surface, and the number of moves
 _ONTO, _MOVES = 256, 60
 # A gradient up to this length, relative to |phi|/size in the bounds, counts as 0. A gradient that differs from
-# differences of phi by more than this is wrong.
+# differences of phi by more than the second number is wrong.
 _FLAT, _WRONG = 1e-8, 1e-4
-# Steps of these differences; it must differ in all of them.
+# The number of steps of these differences; a wrong gradient differs in all of them.
 _STEPS = 6
 
 _STRAIGHT = Bend.of_magnitude(0.0)
 
 
 class FormSurface(Parallel):
-    """A surface with the numbers of a `Form`: what `Formula` and `OwnSurface` share."""
+    """A surface with the numbers of a `Form`: the common part of `Formula` and `OwnSurface`."""
 
     # Fields of the subclasses; `bounds` and `size` are methods.
     box: Box | None
@@ -58,7 +58,7 @@ class FormSurface(Parallel):
 
     def _set(self, common: dict[str, Any], **given: Any) -> None:
         """Set the fields from the arguments of `__init__`."""
-        # `dataclasses.replace` gives every field by its own name.
+        # `dataclasses.replace` gives every field by its own name
         for one in fields(self):  # type: ignore[arg-type]
             given[one.name] = common.pop(one.name, given.get(one.name, one.default))
         for name in common:
@@ -80,7 +80,7 @@ class FormSurface(Parallel):
         raise NotImplementedError
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields: the functions of a form are known to the process that has made it, so each makes its own."""
+        """Return the fields: a process knows only the functions of a form that it made, so each makes its own."""
         return {one.name: getattr(self, one.name) for one in fields(self)}  # type: ignore[arg-type]
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -110,13 +110,13 @@ class FormSurface(Parallel):
 
 
 def _widest(a: Floats, b: Floats, measure: Callable[[Any, Any], Any]) -> tuple[Floats, Floats]:
-    """Of several pairs (7, N, several) in each row the one with the largest measure."""
+    """Return from several pairs (7, N, several) in each row the pair with the largest measure."""
     k = measure(a, b).argmax(axis=1)[None, :, None]
     return np.take_along_axis(a, k, axis=2)[:, :, 0], np.take_along_axis(b, k, axis=2)[:, :, 0]
 
 
 def _box_of(bounds: Any) -> Box | None:
-    """The argument `bounds`, checked."""
+    """Return the argument `bounds`, checked."""
     if bounds is None:
         return None
     corners = checks.parts_of(bounds) or ()
@@ -130,9 +130,9 @@ def _box_of(bounds: Any) -> Box | None:
 
 @dataclass(frozen=True)
 class Form:
-    """phi in its own coordinates, its box, and how much it bends.
+    """phi in its own coordinates, its box, and the bounds of its second derivatives.
 
-    A box may have no ends along an axis on which phi does not depend.
+    A box may be endless along an axis on which phi does not depend.
     """
 
     kind: Any
@@ -143,7 +143,7 @@ class Form:
     bend: Bend = _STRAIGHT
 
     def numbers(self, center: Vector) -> Any:
-        """The numbers that kernels take."""
+        """Return the numbers that kernels take."""
         low, high = self.box or UNBOUNDED
         scale = self.size if math.isfinite(self.size) else 1.0
         narrowest = min(b - a for a, b in zip(low, high, strict=True))
@@ -161,7 +161,7 @@ class Form:
 
     @functools.cached_property
     def corners(self) -> Floats:
-        """Those of the box, (2, 3); along an axis without ends of its largest width: phi is the same all along it."""
+        """The corners of the box, (2, 3); along an endless axis, where phi is constant, with the largest width."""
         corners = np.array(self.box)
         endless = np.isinf(corners[0])
         half = 0.5 * (corners[1] - corners[0])[~endless].max()
@@ -169,7 +169,7 @@ class Form:
         return corners
 
     def domain(self) -> Box | None:
-        """The box in which the bend must be known: a solid's has the margin on each side."""
+        """Return the box in which the bend must be known: a solid's box has the margin on each side."""
         if self.box is None:
             return None
         low, high = self.corners
@@ -183,7 +183,7 @@ class Form:
 
     @functools.cached_property
     def encloses(self) -> bool:
-        """Whether phi is not below 0 on the faces of the box, but for those across the axis of a cylinder."""
+        """Whether phi is not below 0 on the faces of the box, except those across the axis of a cylinder."""
         (low, high), s = self.corners, np.linspace(0.0, 1.0, 33)
         u, v = (grid.ravel() for grid in np.meshgrid(s, s))
         axes = np.flatnonzero(~self.endless).tolist()
@@ -191,7 +191,7 @@ class Form:
         return bool((self.value(low[:, None] + (high - low)[:, None] * np.hstack(faces)) >= 0.0).all())
 
     def bounds(self, center: Vector, rotation: Any) -> Box:
-        """`Surface.bounds`."""
+        """Return `Surface.bounds`."""
         if self.side == "outside" or self.box is None or not self.encloses:
             return UNBOUNDED
         low, high = np.where(self.endless, [[-math.inf], [math.inf]], self.box) + np.array(center)
@@ -199,7 +199,7 @@ class Form:
 
     @functools.cached_property
     def tightest(self) -> tuple[float, Vector | None]:
-        """The smallest radius of curvature that the bound of the bend makes certain, and where: None for infinite."""
+        """The smallest radius of curvature that the bound of the bend makes certain, its place: None if infinite."""
         if self.bend.most <= 0.0:
             return math.inf, None
         points = self.points(_SAMPLES)
@@ -207,7 +207,7 @@ class Form:
         return tightest_of(near, self.value, self.slope, self.bend.most)
 
     def wall_box(self, largest: float) -> Box:
-        """Around the surface as balls up to a radius meet it: where it goes on beyond its box, by so much more."""
+        """A box around the surface that balls up to a radius meet: larger where it continues beyond its own box."""
         if self.box is None:
             return UNBOUNDED
         room = 0.0 if self.side == "outside" or self.encloses else largest
@@ -215,17 +215,17 @@ class Form:
         return tuple((low - room).tolist()), tuple((high + room).tolist())
 
     def value(self, points: Floats) -> Floats:
-        """phi at points (3, N) relative to the center."""
+        """Return phi at points (3, N) relative to the center."""
         with np.errstate(all="ignore"):
             return np.broadcast_to(self.numbers((0.0, 0.0, 0.0)).phi(vec(points)), points.shape[1:])
 
     def slope(self, points: Floats) -> Floats:
-        """Its gradient."""
+        """Return the gradient of phi at points (3, N)."""
         with np.errstate(all="ignore"):
             return slopes_of(self.numbers((0.0, 0.0, 0.0)), vec(points))
 
     def points(self, n: int) -> Floats:
-        """Random points of the box, or around the center if the form has no box."""
+        """Return random points of the box, or around the center if the form has no box."""
         box = np.array(((-self.reach(),) * 3, (self.reach(),) * 3)) if self.box is None else self.corners
         low, high = box[:, :, None]
         return np.asarray(low + (high - low) * np.random.default_rng(0).random((3, n)))
@@ -237,7 +237,7 @@ class Form:
         points = self.points(_ONTO)
         given = self.slope(points)
         agrees, differs = np.zeros((2, _ONTO), np.bool_)
-        # phi may bend within a length much shorter than its reach, up to where the round-off of a place is seen.
+        # phi may bend within a length much shorter than its reach, down to the round-off of a place.
         for step in np.geomspace(_DIFFERENCE, _ROUND_OFF * EPSILON / _WRONG, _STEPS) * self.reach():
             measured, values = self._differences(points, step)
             scale = np.abs(given).max(axis=0) + np.abs(values).max(axis=(1, 2)) / self.reach()
@@ -254,7 +254,7 @@ class Form:
             )
 
     def _differences(self, points: Floats, step: float) -> tuple[Floats, Floats]:
-        """The gradient by central differences of phi (3, N), and phi at their ends (N, 3, 2)."""
+        """Return the gradient by central differences of phi (3, N), and phi at their ends (N, 3, 2)."""
         ends = points[:, :, None, None] + step * np.eye(3)[:, None, :, None] * np.array([1.0, -1.0])
         values = self.value(ends.reshape(3, -1)).reshape(-1, 3, 2)
         # A step is rounded where it is added to a place.
@@ -262,7 +262,7 @@ class Form:
         return (values[:, :, 0] - values[:, :, 1]).T / apart, values
 
     def check(self) -> None:
-        """Raise unless phi is finite in the box, and its surface is there and has a normal."""
+        """Raise unless phi is finite in the box, and has a surface there with a normal."""
         points = self.points(_SAMPLES)
         values = self.value(points)
         wrong = ~np.isfinite(values)
@@ -310,9 +310,9 @@ class Form:
             )
 
     def _departure(self, a: Any, b: Any) -> Any:
-        """How far differences of phi are from those of its gradient; 0 unless a point of the two is admissible.
+        """Return how far differences of phi are from those of its gradient; 0 unless a point of the pair is admissible.
 
-        Each of the two is (7, ...): points, phi and its gradient.
+        Each point of the pair is (7, ...): its coordinates, phi and the gradient.
         """
         side = side_sign(self.side)
         with np.errstate(all="ignore"):
@@ -330,7 +330,7 @@ class Form:
         found = self._sharpness(points, step)
         points = points[:, np.argsort(-np.nan_to_num(found, nan=0.0))[:_ONTO]]
         once, twice = self._sharpness(points, step), self._sharpness(points, 2.0 * step)
-        # Where phi is smooth the two differ by four times the error of the first; at a kink it is half of the other.
+        # Where phi is smooth the two differ by four times the error of `once`; at a kink `twice` is half of `once`.
         least = np.minimum(once, twice) - 4.0 * np.abs(once - twice)
         room = _ROUND_OFF * EPSILON / step * np.abs(self.slope(points)).max(axis=0, initial=0.0)
         sure = np.nan_to_num(least - room, nan=0.0)
@@ -349,13 +349,13 @@ class Form:
         return np.asarray(2.0 * np.abs(np.linalg.eigvalsh(matrices)).max(axis=1))
 
     def _entries(self, points: Floats, step: Floats) -> Floats:
-        """The entries of side H, H = grad grad phi/2, at points by differences of the gradient, (6, N)."""
+        """Return the entries of side H, H = grad grad phi/2, at points by differences of the gradient, (6, N)."""
         side = side_sign(self.side)
         rows = [0.125 * side / step.max() * (self.slope(points + one) - self.slope(points - one)) for one in step]
         return np.array([rows[i][j] + rows[j][i] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))])
 
     def _onto(self, points: Floats) -> Floats:
-        """Points moved onto the surface along the gradient; those that stay in the box."""
+        """Return the points moved onto the surface along the gradient, without those that leave the box."""
         low, high = (np.array(UNBOUNDED) if self.box is None else np.array(self.box))[:, :, None]
         start = np.abs(self.value(points)).max()
         for _ in range(_MOVES):
@@ -374,9 +374,9 @@ class Form:
             )
 
     def sampled_bend(self) -> Bend:
-        """The bend by differences of the gradient at some points, its range doubled."""
+        """Return the bend by differences of the gradient at some points, with its range doubled."""
         (low, high), points = self.corners, self.points(_SAMPLES)
-        # Of a solid in a box that is larger by twice the margin
+        # For a solid, in a box that is larger by twice the margin
         points = points + (2.0 * _MARGIN if self.side == "outside" else 0.0) * (points - 0.5 * (low + high)[:, None])
         side = side_sign(self.side)
         # Flights are in the admissible part only.
@@ -388,7 +388,7 @@ class Form:
         noise = _NOISE * np.abs(entries).max()
         room = 0.5 * (_SAFETY - 1.0) * (most - least) + noise
         bend = Bend.of_entries((least - room)[:, None], (most + room)[:, None])
-        # The eigenvalues at the points are closer together than those of any entries in these ranges.
+        # The eigenvalues at the points are closer together than those of any matrix with entries in these ranges.
         exact = Bend.of_entries(entries, entries)
         wider = 0.5 * (_SAFETY - 1.0) * (exact.most - exact.least) + noise
         return bend._replace(least=float(exact.least - wider), most=float(exact.most + wider))

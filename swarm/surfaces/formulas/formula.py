@@ -1,6 +1,6 @@
-"""A surface by a formula: what is derived from it, then a surface by functions.
+"""A surface by a formula: its derivatives, and then a surface by functions.
 
-The formula's text is never evaluated (see `expression`). What is compiled is text of our own (see `derivatives`),
+The formula's text is never evaluated (see `expression`). The compiled text is the engine's own (see `derivatives`),
 written from the tree of the derivatives.
 """
 
@@ -24,7 +24,7 @@ from .form import Form, FormSurface
 from .numbers import Bend
 from .polynomial import base_of
 
-# Points at which it is asked whether a formula bends upwards, and what counts as 0 there: round-off.
+# The number of points at which a formula is tested for bending upwards, and the size that counts as 0: round-off.
 _SAMPLES, _FLAT = 1024, 1e-9
 
 
@@ -68,7 +68,7 @@ class Formula(FormSurface):
         self._set(common, formula=formula, box=bounds, length=size)
 
     def __repr__(self) -> str:
-        """The call that makes it, omitting defaults."""
+        """Return the call that makes it, omitting defaults."""
         given = [f for f in fields(self) if f.name != "formula" and getattr(self, f.name) != f.default]
         rest = "".join(f", {f.metadata.get('key', f.name)}={getattr(self, f.name)!r}" for f in given)
         return f"Formula({self.formula!r}{rest})"
@@ -88,13 +88,13 @@ class Formula(FormSurface):
         return _form_of(self.formula, parameters, self.box, self.length, self.side, self.curvature)
 
 
-# A scene is made again in each process, run and copy, and bounds by intervals take 0.1 s.
+# Every process, run and copy makes a scene again, and bounds by intervals take 0.1 s.
 @functools.lru_cache(maxsize=64)
 def _form_of(
     formula: str, given: tuple[tuple[str, float], ...], box: Box | None, size: float | None, side: str,
     curvature: float | None,
 ) -> Form:  # fmt: skip
-    """The form of a formula, with the box, the size and the bend that are not given."""
+    """Return the form of a formula; the box, the size and the bend are computed if they are not given."""
     names, values = tuple(name for name, _value in given), tuple(value for _name, value in given)
     code = derived(formula, names)
     exact = code.with_values(values)
@@ -126,7 +126,7 @@ def _form_of(
 def _seems_convex(phi: Any, hessian: Any, parameters: Any, box: Box | None, side: str) -> bool:
     """Whether a cavity with a polynomial of a higher degree bends upwards at points in its box.
 
-    By the principal minors of its second derivatives: their arithmetic is that of every processor.
+    By the principal minors of its second derivatives: their arithmetic is the same on every processor.
     """
     if box is None or side != "inside" or not np.isfinite(box).all():
         return False
@@ -141,7 +141,7 @@ def _seems_convex(phi: Any, hessian: Any, parameters: Any, box: Box | None, side
 
 
 def _checked(parameters: Any) -> dict[str, float] | None:
-    """The argument `parameters`, checked."""
+    """Return the argument `parameters`, checked."""
     if parameters is None:
         return None
     if not isinstance(parameters, Mapping):

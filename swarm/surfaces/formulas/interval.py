@@ -12,12 +12,12 @@ from ...state import Floats
 from ..surface import Box
 from .expression import NonSmoothTerm
 
-# The functions of the system's library are off by less than this.
+# The functions of the system's library are less inexact than this.
 _ULPS = 4
 
 
 class Interval:
-    """[low, high] in each element, rounded outward; what is not known is [-inf, inf]."""
+    """[low, high] in each element, rounded outward; an unknown interval is [-inf, inf]."""
 
     def __init__(self, low: Any, high: Any) -> None:
         self.low, self.high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
@@ -30,7 +30,7 @@ class Interval:
             products = np.array(
                 np.broadcast_arrays(*(a * b for a in (self.low, self.high) for b in (other.low, other.high)))
             )
-        # 0 x inf: every number of the one times every number of the other
+        # 0 x inf is 0: an endless interval holds finite numbers only, and 0 times each of them is 0.
         products = np.where(np.isnan(products), 0.0, products)
         return _wider(products.min(axis=0), products.max(axis=0), 1)
 
@@ -38,7 +38,7 @@ class Interval:
         """1/[low, high]"""
         with np.errstate(divide="ignore"):
             low, high = 1.0 / self.high, 1.0 / self.low
-        # A zero at one end leaves a half line, one between the ends the whole.
+        # A zero at one end leaves a half line, a zero between the ends the whole line.
         whole = (self.low == 0.0) & (self.high == 0.0)
         low = np.where(whole | ((self.low < 0.0) & (self.high >= 0.0)), -np.inf, low)
         high = np.where(whole | ((self.low <= 0.0) & (self.high > 0.0)), np.inf, high)
@@ -54,7 +54,7 @@ class Interval:
         return Interval(np.maximum(wide.low, 0.0), wide.high)
 
     def monotonic(self, function: Callable[[Floats], Any], bottom: float | None = None) -> "Interval":
-        """A function that rises or falls everywhere or, with a bottom, rises from it to both sides of 0."""
+        """Return the interval of a function that is monotonic or, with `bottom`, rises from it to both sides of 0."""
         with np.errstate(divide="ignore"):
             a, b = function(self.low), function(self.high)
         low = np.minimum(a, b)
@@ -69,7 +69,7 @@ class Interval:
         return Interval(np.where(known, found.low, -np.inf), np.where(known, found.high, np.inf))
 
     def cos(self) -> "Interval":
-        """The cosine."""
+        """Return the cosine."""
         with np.errstate(invalid="ignore"):
             a, b = np.cos(self.low), np.cos(self.high)
         low = np.where(self._passes(math.pi, 2.0 * math.pi), -1.0, np.fmin(a, b))
@@ -77,20 +77,20 @@ class Interval:
         return Interval(np.maximum(wide.low, -1.0), np.minimum(wide.high, 1.0))
 
     def sin(self) -> "Interval":
-        """The sine, by the cosine; wider by the round-off of an argument near 1."""
+        """Return the sine, by the cosine; wider by the round-off of an argument near 1."""
         cos = (self + Interval(-0.5 * math.pi, -0.5 * math.pi)).cos()
         slack = 1e-15 * (1.0 + np.maximum(np.abs(cos.low), np.abs(cos.high)))
         return Interval(cos.low - slack, cos.high + slack)
 
     def tan(self) -> "Interval":
-        """The tangent; nothing is known of a cell with a pole."""
+        """Return the tangent; unknown in a cell with a pole."""
         pole = self._passes(0.5 * math.pi, math.pi)
         with np.errstate(invalid="ignore"):
             a, b = np.tan(self.low), np.tan(self.high)
         return _wider(np.where(pole, -np.inf, a), np.where(pole, np.inf, b), _ULPS)
 
     def _passes(self, start: float, period: float) -> Any:
-        """Whether start + k period is in the interval; where that is uncertain, yes."""
+        """Whether start + k period is in the interval; true where that is uncertain."""
         slack = 1e-12 * (1.0 + np.maximum(np.abs(self.low), np.abs(self.high)))
         with np.errstate(invalid="ignore"):
             first = np.ceil((self.low - slack - start) / period) * period + start
@@ -105,7 +105,7 @@ def _wider(low: Any, high: Any, ulps: int) -> Interval:
 
 
 def bounds_of(expression: Any, known: dict[Any, Interval]) -> Interval:
-    """Bounds of a SymPy expression by those of its symbols; `known` keeps those of its parts too."""
+    """Return the bounds of a SymPy expression by those of its symbols; `known` also keeps those of its parts."""
     if expression not in known:
         with np.errstate(over="ignore"):
             known[expression] = _bounds_of(expression, known)
@@ -142,14 +142,14 @@ class IntervalBoxes:
 
     @classmethod
     def grid(cls, axes: Sequence[Any], box: Any, shape: Any) -> "IntervalBoxes":
-        """A box cut into so many cells along each edge."""
+        """Return a box cut into `shape` cells along its edges."""
         low, high = np.array(box)[:, :, None, None, None]
         index, counts = np.indices(tuple(shape)), np.array(shape)[:, None, None, None]
         lower, upper = ((low + (high - low) * ((index + end) / counts)).reshape(3, -1) for end in (0, 1))
         return cls(axes, lower, upper)
 
     def bounds(self, expression: Any) -> Interval:
-        """Bounds of an expression in each cell."""
+        """Return the bounds of an expression in each cell."""
         found = bounds_of(expression, self._known)
         return Interval(*(np.broadcast_to(end, self.lower[0].shape) for end in (found.low, found.high)))
 
@@ -163,14 +163,14 @@ class IntervalBoxes:
         return found
 
     def may_be_admissible(self, phi: Any, side: float) -> Any:
-        """In which cells side * phi may be 0 or below."""
+        """Whether side * phi may be 0 or below in each cell."""
         level = self.bounds(phi)
         return ~((level.low if side > 0.0 else -level.high) > 0.0)
 
 
 # --- Where a formula may have a corner or a pole ---------------------------------------------------------
 
-# Cells along an edge at first, how often they are halved, and operations of one turn: seconds.
+# Cells along an edge at first, the most halvings, and the operations of one turn: seconds.
 _CELLS, _HALVINGS, _MOST_WORK = 8, 14, 2**22
 _REASONS = {
     "above 0": ("its argument may be 0 or below", ", or add a small constant, as in sqrt(x**2 + 1e-6)"),
@@ -192,9 +192,9 @@ def check_smooth(
 ) -> None:
     """Raise unless every piece is surely smooth wherever side * phi may be 0 or below in a box.
 
-    Cells that may hold a corner or a pole are halved until no such cell is left, or too many are. What counts is each
-    root, power, quotient, log and tan as it was read. The argument of a piece has been simplified, which changes no
-    value of it where the pieces within it, checked in the same cells, are smooth.
+    Cells that may hold a corner or a pole are halved until no such cell is left, or too many are. Each root, power,
+    quotient, log and tan counts as it was read. The argument of a piece has been simplified, which does not change its
+    value where the pieces within it, checked in the same cells, are smooth.
 
     Args:
         pieces: inner ones first.
@@ -231,7 +231,7 @@ def check_smooth(
 
 
 def _may_be_rough(piece: NonSmoothTerm, slopes: Sequence[Any], cells: IntervalBoxes) -> Any:
-    """In which cells a piece may be other than smooth."""
+    """Whether a piece may be other than smooth in each cell."""
     whole, centred = cells.bounds(piece.argument), cells.centred(piece.argument, slopes)
     return ~_is_smooth(piece, Interval(np.maximum(whole.low, centred.low), np.minimum(whole.high, centred.high)))
 
@@ -246,9 +246,9 @@ def _is_smooth(piece: NonSmoothTerm, argument: Interval) -> Any:
 
 
 def _placed(corners: tuple[Floats, Floats], box: Box | None, scale: float) -> tuple[Floats, ...]:
-    """The corners of cells in a box from those in a cube from -1 to 1."""
+    """Return the corners of cells in a box from those in a cube from -1 to 1."""
     if box is None:
-        # All of space is in the cube: its faces are infinitely far.
+        # All of space is in the cube: its faces are infinitely far
         with np.errstate(divide="ignore"):
             return tuple(scale * end / (1.0 - np.abs(end)) for end in corners)
     low, high = np.array(box)[:, :, None]
@@ -256,7 +256,7 @@ def _placed(corners: tuple[Floats, Floats], box: Box | None, scale: float) -> tu
 
 
 def _halved(lower: Floats, upper: Floats) -> tuple[Floats, ...]:
-    """Each cell as eight."""
+    """Return each cell as eight."""
     edges = np.array([lower, 0.5 * (lower + upper), upper])
     parts = np.array(list(itertools.product((0, 1), repeat=3))).T[:, :, None]
     rows, cells = np.arange(3)[:, None, None], np.arange(lower.shape[1])

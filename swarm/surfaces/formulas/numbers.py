@@ -1,4 +1,4 @@
-"""A surface by functions as kernels take it: its flights by safe steps. Its subclasses give phi and gradient."""
+"""The numbers of a surface by functions: its flights by safe steps. Its subclasses give phi and gradient."""
 
 import math
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ from ..curvature import matrices_of
 from ..time_of_impact.course import Majorant, positive
 from ..time_of_impact.looks import FallByLooks, FallToBox, Straight, falling, first_found
 
-# Points this close, relative to the size, are joined by Gauss's rule, with an error of the 7th power; its outer node.
+# Points this close, relative to the size, are joined by Gauss's rule, with an error of the 7th power; its outer node
 _SHORT = 1e-2
 _NODE = 0.5 * math.sqrt(0.6)
 _ONE = np.float64(1.0)
@@ -34,13 +34,13 @@ class Bend(NamedTuple):
 
     @classmethod
     def of_magnitude(cls, curvature: float) -> "Bend":
-        """|w.H w| <= curvature/2 for every unit vector w."""
+        """Return the bend with |w.H w| <= curvature/2 for every unit vector w."""
         k = 0.5 * curvature
         return cls(-k, k, Symmetric(-k, -k, -k, 0.0, 0.0, 0.0), Symmetric(k, k, k, 0.0, 0.0, 0.0))
 
     @classmethod
     def of_entries(cls, low: Any, high: Any) -> "Bend":
-        """From bounds of the entries in each of many cells, (6, cells)."""
+        """Return the bend from bounds of the entries in each of many cells, (6, cells)."""
         middle, radius = map(matrices_of, (0.5 * (low + high), 0.5 * (high - low)))
         # |lambda(A + E) - lambda(A)| <= |E|, the largest sum of a row; and the round-off of lambda(A)
         values = np.linalg.eigvalsh(middle)
@@ -50,7 +50,7 @@ class Bend(NamedTuple):
 
 
 def _quadratic(v, high, low):
-    """The upper bound of v.H v for entries of H from `low` to `high`; the lower bound with the two exchanged."""
+    """Return the upper bound of v.H v for entries of H from `low` to `high`; exchange the two for the lower bound."""
     xy, yz, zx = 2.0 * v.x * v.y, 2.0 * v.y * v.z, 2.0 * v.z * v.x
     sum = high.xx * v.x * v.x + high.yy * v.y * v.y + high.zz * v.z * v.z
     sum += select(xy > 0.0, high.xy, low.xy) * xy
@@ -62,7 +62,7 @@ def _larger(a, b):
 
 
 def _between(low, high, x, v):
-    """When a flight is between two planes: (from, until)."""
+    """Return when a flight is between two planes: (from, until)."""
     still, within = v == 0.0, (low <= x) & (x <= high)
     speed = select(still, 1.0, v)
     a, b = (low - x) / speed, (high - x) / speed
@@ -72,7 +72,7 @@ def _between(low, high, x, v):
 
 
 class _Face(Majorant):
-    """How far a fall is from a face of a box, c + 2 b t + a2 t^2, below 0 beyond it; and when it comes to it."""
+    """The distance of a fall from a face of a box, c + 2 b t + a2 t^2, below 0 beyond it, and when it arrives."""
 
     c: float
     b: float
@@ -81,16 +81,16 @@ class _Face(Majorant):
 
 
 def _face(low, high, x, v, pull):
-    """The face beyond which a coordinate is, or any if it is beyond none."""
+    """Return the face beyond which a coordinate is, or any face if it is beyond none."""
     below = x - low < high - x
-    # Floats of NumPy: in plain Python only their quotients by 0 are infinite.
+    # Floats of NumPy: in plain Python only their quotients by 0 are infinite
     sign = select(below, _ONE, -_ONE)
     c, b, a2 = select(below, x - low, high - x), 0.5 * sign * v, 0.5 * sign * pull
     return _Face(c, b, a2, select(c < 0.0, rise_time(c, b, a2), 0.0))
 
 
 def _later(one, other):
-    """The face that a fall comes to later."""
+    """Return the face that a fall reaches later."""
     later = one.time >= other.time
     return _Face(*(select(later, a, b) for a, b in zip(one, other, strict=True)))
 
@@ -98,12 +98,12 @@ def _later(one, other):
 class OwnNumbers(contract.Smooth):
     """The numbers of a surface by functions. The box is relative to the center."""
 
-    # Functions of users may: their last bit may differ between plain Python and compiled kernels.
+    # A user's functions may call it: their last bit may differ between plain Python and compiled kernels.
     calls_library = True
 
     center: Vec
     side: float
-    step: float  # of the differences that replace second derivatives
+    step: float  # the step of the differences that replace second derivatives
     size: float
     bends: Bend
     low: Vec
@@ -126,7 +126,7 @@ class OwnNumbers(contract.Smooth):
         return Symmetric(k * (a.x - b.x), k * (c.y - d.y), k * (e.z - f.z), 0.5 * k * xy, 0.5 * k * yz, 0.5 * k * zx)
 
     def bent_along(self, r, w):
-        """w.side H w at a place."""
+        """Return w.side H w at a place."""
         h = self.hessian(r)
         return self.side * _quadratic(w, h, h)
 
@@ -134,8 +134,8 @@ class OwnNumbers(contract.Smooth):
         d = r1 - r0
         if largest(d) > _SHORT * self.size:
             return self.phi(r1) - self.phi(r0)
-        # The difference of phi has few digits at close points, and the integral of grad phi.d all of them: Gauss's rule
-        # of three points
+        # At close points the difference of phi has few digits, and the integral of grad phi.d has all of them: Gauss's
+        # rule of three points
         m, e = 0.5 * (r0 + r1), _NODE * d
         outer = self.gradient(m - e) + self.gradient(m + e)
         return dot(5.0 * outer + 8.0 * self.gradient(m), d) / 18.0
@@ -146,7 +146,7 @@ class OwnNumbers(contract.Smooth):
         return self.side * (-1.0 / least if least < 0.0 else math.inf)
 
     def hessian_bounds(self, r):
-        # Around a solid the bend is known up to the margin; half way there `clearance` takes over.
+        # Around a solid the bend is known up to the margin; from half of it on `clearance` is used instead.
         most, magnitude = self.bends.most, max(abs(self.bends.least), abs(self.bends.most))
         if self.closed == 0.0:
             return most, magnitude, self.size
@@ -157,7 +157,7 @@ class OwnNumbers(contract.Smooth):
         return select(self.closed > 0.0, max(self._outside(r), 0.0), 0.0)
 
     def _outside(self, r):
-        """The distance outside the box, by its largest component; below 0 inside."""
+        """Return the distance outside the box, by its largest component; below 0 inside."""
         d = r - self.center
         low, high = self.low - d, d - self.high
         across = _larger(_larger(low.x, high.x), _larger(low.y, high.y))
@@ -168,7 +168,7 @@ class OwnNumbers(contract.Smooth):
         return self.margin - self._outside(r)
 
     def last_face(self, r, v, pull):
-        """(the face of the box that a fall comes to last, whether it is beyond it)."""
+        """Return (the face of the box that a fall reaches last, whether the fall begins beyond it)."""
         d, low, high = r - self.center, self.low, self.high
         coordinates = total(absolute(r)) + total(absolute(self.center))
         face = _later(_face(low.x, high.x, d.x, v.x, pull.x), _face(low.y, high.y, d.y, v.y, pull.y))
@@ -180,7 +180,7 @@ class OwnNumbers(contract.Smooth):
         return first_found(self.straight(r, v))
 
     def straight(self, r, v):
-        """The `Straight` of a flight."""
+        """Return the `Straight` of a flight."""
         bend, speed2 = self.bends, square(v)
         start, end = self.span(r, v)
         # least <= v.side H v <= most
@@ -203,7 +203,7 @@ class OwnNumbers(contract.Smooth):
 
 
 class SmoothCavity(OwnNumbers):
-    """The cavity of a formula that is no polynomial of degree 4 or less: lanes look at its flights."""
+    """The cavity of a formula that is no polynomial of degree 4 or less: its flights are searched by looks in lanes."""
 
     in_steps = True
     looked_at = True
@@ -221,7 +221,7 @@ class SmoothCavity(OwnNumbers):
 
 
 class SmoothSolid(SmoothCavity):
-    """The solid of such a formula."""
+    """The solid of a formula that is no polynomial of degree 4 or less."""
 
     falls = FallToBox
 

@@ -72,7 +72,7 @@ class OwnSurface(FormSurface):
         bounds: ArrayLike | None = None,
         **common: Any,
     ) -> None:
-        # They have defaults since `dataclasses.replace` gives each by the name of its field.
+        # The arguments have defaults since `dataclasses.replace` gives each by the name of its field.
         needed = {"phi": ("phi_function", phi), "gradient": ("gradient_function", gradient), "size": ("length", size)}
         for argument, (name, value) in needed.items():
             if common.setdefault(name, value) is None:
@@ -105,19 +105,19 @@ class OwnSurface(FormSurface):
         return "a jump, a kink or a second derivative above `curvature`"
 
     def table(self) -> dict[str, Any]:
-        """Its table in a file: enough to recognise it, not to make it again."""
+        """Return its table in a file: enough to recognise the surface, not to make it again."""
         given = {"code": self._form.kind.__name__, "parameters": self.parameters._asdict(), "size": self.length}
         given |= {"bounds": self.box, "center": self.center, "side": self.side, "curvature": self.curvature}
         given |= {one.name: getattr(self, one.name) for one in fields(Surface) if not is_left_out(self, one)}
         return {"kind": "own", **{key: value for key, value in given.items() if value is not None}}
 
 
-# A scene is made again in each process, run and copy, and the checks take 0.2 s.
+# Every process, run and copy makes a scene again, and the checks take 0.2 s.
 @functools.lru_cache(maxsize=64)
 def _form_of(
     kind: Any, values: tuple[float, ...], box: Box | None, size: float, side: str, curvature: float | None
 ) -> Form:
-    """The checked form of functions: of a class of numbers and the values of its parameters."""
+    """Return the checked form of functions: of a class of numbers and the values of its parameters."""
     form = Form(kind, values, box, size, side)
     if curvature is None and box is None:
         raise SceneError(
@@ -136,7 +136,7 @@ def _form_of(
 
 # --- Does it compile? ---------------------------------------------------------------------------------
 
-# Lines of Numba's errors that tell the place, not the cause.
+# Lines of Numba's errors that give the place, not the cause
 _WHERE = re.compile(
     r"\s*(>>>|There (are|is) |- |Overload |Intrinsic |With argument|Rejected|During|raised from|File |No match|"
     r"<source|Enable|$)|.*(Failed in nopython|No implementation of function)"
@@ -154,7 +154,7 @@ def _compiled_gradient(surface, r):
 
 
 def _not_compiled(name: str, message: str) -> SceneError:
-    """The error about a function of that name, with the first line of Numba's message that tells the cause."""
+    """Return the error about a function with this name, with the first line of Numba's message that gives the cause."""
     lines = [line.strip() for line in message.splitlines() if not _WHERE.match(line)]
     cause = lines[0] if lines else message.strip().splitlines()[0]
     if "NRT required" in cause or "Only accept returning of array" in cause:

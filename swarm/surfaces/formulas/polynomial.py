@@ -1,4 +1,4 @@
-"""Formulas that are polynomials of degree 4 at most, as kernels take them: their flights by exact coefficients."""
+"""The numbers of formulas that are polynomials of degree 4 at most: their flights by exact coefficients."""
 
 import math
 from typing import Any
@@ -14,31 +14,31 @@ from ..time_of_impact.looks import FallToBox, falling
 from ..time_of_impact.polynomial import ConvexFlight, PolynomialFall, PolynomialFlight
 from .numbers import OwnNumbers, SmoothCavity, SmoothSolid
 
-# The first step goes at most so many sizes, by the sum of the components of the velocity: about the longest chord.
+# The first step is at most this many sizes long, by the sum of the components of the velocity: about the longest chord.
 _WINDOW = 2.8
-# A root at the start is divided out of a level up to this part of the other terms: it is round-off.
+# A root at the start is divided out of a level up to this part of the other terms, which is round-off.
 _ROUND_OFF = 1e-13
-# A step of Newton's method is taken where it changes the slope, and the time, by at most this part of them.
+# A step of Newton's method is taken where it changes the slope, and the time, by at most this part of each.
 _REFINED = 1e-4
 # b^2 - a c has lost digits where it is less than this part of b^2.
 _CANCELS = 1.0 / 64.0
 
 
 class PolynomialNumbers(OwnNumbers):
-    """phi is a polynomial of degree 4 at most. Subclasses are a cavity, or a solid with a box that holds it."""
+    """A polynomial phi of degree 4 at most. Subclasses are a cavity, or a solid with a box that holds it."""
 
     is_solid = False
 
     def along(self, r, v):
-        """The coefficients of phi(r + v t) by powers of t: three, or five."""
+        """Return the coefficients of phi(r + v t) by powers of t: three, or five."""
         raise NotImplementedError
 
     def along_fall(self, r, v, half_pull):
-        """Those of phi(r + v t + G t^2/2) of degree 3 or 4: seven, or nine."""
+        """Return the coefficients of phi(r + v t + G t^2/2) of degree 3 or 4: seven, or nine."""
         raise NotImplementedError
 
     def level_from(self, r, v):
-        """(start, end, the level's coefficients from the start on) of the part of a straight flight that is near."""
+        """Return (start, end, the level's coefficients from the start on) of the near part of a straight flight."""
         side = self.side
         if not self.is_solid:
             return None, None, tuple(side * one for one in self.along(r, v))
@@ -68,14 +68,14 @@ class QuadraticCavity(PolynomialNumbers):
         if self.is_solid:
             time = start + rise_time_by(c, b, a, d)
             return self.refined(None, r, v, select((start <= end) & (time <= end), time, math.inf)), True
-        # From afar little is left of it; the level half way between both roots is -d/a.
+        # From afar d has few digits; the level half way between both roots is -d/a.
         middle = -b / select(a < 0.0, a, 1.0)
         far = (a < 0.0) & (abs(d) < _CANCELS * b * b) & (middle < math.inf)
         there = self.side * self.phi(r + select(far, middle, 0.0) * v)
         return self.refined(None, r, v, rise_time_by(c, b, a, select(far, -a * there, d))), True
 
     def course(self, r, v, pull):
-        # phi(r + v t + G t^2/2) with H, which is the same everywhere
+        # phi(r + v t + G t^2/2) with H, which is constant
         side, h = self.side, self.hessian(r)
         c, twice_b, a2 = self.along(r, v)
         _c, along_pull, pull2 = self.along(r, pull)
@@ -96,10 +96,10 @@ class QuadraticCavity(PolynomialNumbers):
 
 
 class QuadraticSolid(QuadraticCavity):
-    """The same of a solid."""
+    """A solid with a polynomial of degree 2."""
 
     is_solid = True
-    # Outside its box there is no wall, whatever phi is there: the level along a fall is no quartic.
+    # Outside its box there is no wall, for any value of phi: the level along a fall is no quartic.
     is_quartic = False
     looked_at = True
     falls = FallToBox
@@ -110,7 +110,7 @@ class QuadraticSolid(QuadraticCavity):
 
 
 class ConvexQuadraticCavity(QuadraticCavity):
-    """One that is convex: the level along a flight has no maximum, and the root of a long flight loses no digits."""
+    """A convex cavity: the level along a flight has no maximum, and the root of a long flight loses no digits."""
 
     def first_hit(self, r, v):
         c, twice_b, a = self.along(r, v)
@@ -156,7 +156,7 @@ class QuarticCavity(PolynomialNumbers):
         )
 
     def fall(self, gravity, r, v):
-        """The level along a fall, for a guess of the hit."""
+        """Return the level along a fall, for a guess of the hit."""
         near = self.near(gravity, r, v)
         powers = near.c, 2.0 * near.b, near.a2, *near.higher
         rest = 0.0
@@ -172,26 +172,26 @@ class QuarticCavity(PolynomialNumbers):
         pull, size = as_vector(gravity), self.size
         level = tuple(self.side * one for one in self.along_fall(r, v, 0.5 * pull))
         window = 2.0 * math.sqrt(size * size / (square(v) + size * norm(pull)))
-        # What is left may be as much as a rounding of the place makes of the level.
+        # The level that remains may be as much as a rounding of the place changes it.
         nearly = EPSILON * self.gap_scale(r)
         return LevelBound(level[0], 0.5 * level[1], level[2], level[3:], window, nearly, True)
 
 
 class ConvexQuarticCavity(QuarticCavity):
-    """One that is convex where it was looked at."""
+    """A cavity that is convex at the sampled points."""
 
     flight = ConvexFlight
 
 
 class QuarticSolid(QuarticCavity):
-    """The same of a solid."""
+    """A solid with a polynomial of degree 3 or 4."""
 
     is_solid = True
     kept = 7
     aims = False
 
     def near(self, gravity, r, v):
-        # Outside its box there is no wall, whatever phi is there: a fall comes to each face that it is beyond.
+        # Outside its box there is no wall, for any value of phi: a fall reaches each face that it is beyond.
         level = QuarticCavity.near(self, gravity, r, v)
         face, beyond = self.last_face(r, v, as_vector(gravity))
         return level._replace(
@@ -202,7 +202,7 @@ class QuarticSolid(QuarticCavity):
 
 
 def base_of(along: Any, is_solid: bool, is_convex: bool) -> Any:
-    """The class of numbers of a formula with these coefficients along a flight, None if it is no polynomial."""
+    """Return the class of numbers of a formula with these coefficients along a flight, None if it is no polynomial."""
     if along is None:
         cavity, solid = SmoothCavity, SmoothSolid
     elif along.degree <= 2:

@@ -1,7 +1,7 @@
-"""A polynomial along a flight as a polynomial of time: the text of its coefficients, from the tree of phi.
+"""A polynomial phi along a flight as a polynomial of time: the text of its coefficients, from the tree of phi.
 
-Sums and products of polynomials of time keep what the user has factored, which costs fewer operations than monomials
-and loses fewer digits.
+Sums and products of polynomials of time keep the user's factors, which costs fewer operations than monomials and loses
+fewer digits.
 """
 
 from typing import Any
@@ -26,7 +26,7 @@ class LevelSeries:
         self._known: dict[Any, list[str] | None] = {}
 
     def of(self, expression: Any) -> list[str] | None:
-        """The coefficients of an expression, or None: no polynomial, or one of a higher degree."""
+        """Return the coefficients of an expression, or None: it is no polynomial, or one of a higher degree."""
         if expression not in self._known:
             self._known[expression] = self._of(expression)
         return self._known[expression]
@@ -76,7 +76,7 @@ class LevelSeries:
 
     @staticmethod
     def _coefficient(first: list[str], second: list[str], k: int) -> str:
-        """That of t^k in a product, which is a square where both are the same."""
+        """Return the coefficient of t^k in a product, which is a square if the factors are equal."""
         pairs = [(i, k - i) for i in range(len(first)) if 0 <= k - i < len(second)]
         if first is not second:
             return " + ".join(f"{first[i]} * {second[j]}" for i, j in pairs)
