@@ -1,4 +1,4 @@
-"""Samples from files: what a header says is compared with the file before any of it is allocated."""
+"""Samples from files: the header is compared with the file before any of the stated size is allocated."""
 
 import math
 from pathlib import Path
@@ -21,7 +21,7 @@ def read_samples(path: str | Path) -> Floats:
     """The samples in a .npy file, or in the one dataset with three axes of an HDF5 file.
 
     Raises:
-        SceneError: the file cannot be read, holds no such array, or less than its header says, or more than memory.
+        SceneError: the file cannot be read, holds no such array, or less than its header states, or more than memory.
     """
     path = checks.path_of("path", path)
     try:
@@ -42,12 +42,12 @@ def _of_npy(path: Path) -> Floats:
     if int.from_bytes(begin[8 : 10 if begin[6:7] == b"\x01" else 12], "little") > size:
         raise SceneError(f"the file {path} must be whole, got a header that is longer than the file")
     try:
-        # The map is refused where the file is shorter than its header says.
+        # The map is refused where the file is shorter than its header states.
         found = np.load(path, mmap_mode="r", allow_pickle=False)
     except OSError:
         raise
     except Exception as error:
-        # NumPy reads the header as Python, so a damaged one may raise whatever its parser does.
+        # NumPy reads the header as Python, so a damaged one may raise any error of its parser.
         raise ValueError(f"it is no .npy file, or is damaged: {error}") from error
     _require(path, found.shape, found.dtype)
     return np.array(found)
@@ -77,7 +77,7 @@ def _of_hdf5(path: Path) -> Floats:
 
 
 def _require(path: Path, shape: tuple[int, ...], kind: np.dtype[Any]) -> float:
-    """The size of an array [bytes], if it is one of numbers that fits in memory."""
+    """Return the size of an array [bytes], if it is one of numbers that fits in memory."""
     if kind.kind not in "iuf":
         raise SceneError(f"the file {path} must hold an array of numbers, got {kind}")
     size = float(math.prod(shape)) * kind.itemsize

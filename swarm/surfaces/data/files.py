@@ -12,14 +12,14 @@ _MESH = ("kind", "file", "spacing", "side", "scale", "weld", *(one.name for one 
 
 
 def samples_of(table: Any, where: str, path: Path) -> Any:
-    """The table of a surface, with the samples of one that takes them from a file or a mesh.
+    """Return the table of a surface, with samples read from its file or mesh, if it names one.
 
-    A mesh without a spacing takes its triangles from the file itself.
+    A mesh without a spacing keeps its triangles.
 
     Args:
-        table: as it is in the scene file.
-        where: what it is called in errors, such as "surface[0]".
-        path: of the scene file.
+        table: the table in the scene file.
+        where: its name in errors, such as "surface[0]".
+        path: the path of the scene file.
 
     Raises:
         SceneError: a file cannot be read, or a key of a mesh is unknown or missing.
@@ -31,7 +31,7 @@ def samples_of(table: Any, where: str, path: Path) -> Any:
     if not isinstance(name, str):
         came = 'nothing; add file = "part.stl"' if name is None else repr(name)
         raise SceneError(f"{where}.file: expected the name of a file, got {came}")
-    from .arrays import read_samples  # loaded where a file is
+    from .arrays import read_samples  # loaded only where a file is used
     from .mesh import from_mesh
 
     given = {key: value for key, value in table.items() if key != "file"}

@@ -17,14 +17,14 @@ from .thickness import require_resolved
 
 # Samples beyond the mesh on each side, in cells: the surface must not reach the border of the grid.
 _MARGIN = 3.0
-# Bytes of a sample and of what is made of it, about.
+# About the bytes of a sample and of all that is derived from it.
 _SAMPLE = 100
-# Samples that are found together: for each call a tree of the triangles is made.
+# Samples that are computed together: for each call a tree of the triangles is built.
 _TOGETHER = 4_000_000
-# Points of the mesh at which phi is found together.
+# Points of the mesh at which phi is computed together.
 _BATCH = 65_536
-# Where the surface is farther away than this, in cells, phi is not the distance from it: the sampled one is that from
-# the mesh, also around a fold that is lost. To points where phi changes its sign along an edge it is less elsewhere.
+# Farther from the surface than this, in cells, phi is not the distance from it but from the mesh, also around a lost
+# fold. Nearer, |phi| is less than the distance to points where phi changes its sign along an edge.
 _FAR = 2.0
 
 
@@ -47,10 +47,10 @@ def from_mesh(
         spacing: between samples [m], at most 0.8 of the thinnest wall or gap of the mesh. Edges of the mesh become
             round within about one, and folds such as an engraved letter or the tip of a blade where they are thinner.
         side: "inside" or "outside" of the mesh, the admissible part.
-        scale: what a unit of the file is in metres, 0.001 for millimetres.
+        scale: the length of a unit of the file in metres, 0.001 for millimetres.
         weld: corners of open edges this near [m] are one, so that seams close; 0: none are. None: 1e-5 of the diagonal
             of the mesh, or a quarter of the shortest open edge if that is less.
-        common: rotation, restitution, and what else every surface takes.
+        common: rotation, restitution, and the other arguments that every surface takes.
 
     Returns:
         The surface. Its `mesh_error` is the largest distance [m] from it to the vertices, the middles of the edges and
@@ -89,11 +89,11 @@ def from_mesh(
 
 
 def _distance(axes: list[Floats], mesh: Soup) -> Floats:
-    """The signed distance from the mesh on a grid."""
+    """Return the signed distance from the mesh on a grid."""
     with needed_by("from_mesh", "mesh"):
         import igl
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    # By the angle-weighted normal of what is nearest, which is right for every closed mesh; winding numbers summed
+    # By the angle-weighted normal of the nearest element, which is right for every closed mesh; winding numbers summed
     # over a tree are wrong by 0.01 R next to a ring of 10^5 triangles.
     found = igl.signed_distance(points, mesh.vertices, mesh.triangles, igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL)[0]
     return np.asarray(found).reshape([len(axis) for axis in axes])
@@ -112,7 +112,7 @@ def _error(made: Sampled, mesh: Soup) -> float:
 
 
 def _crossings(made: Sampled) -> Floats:
-    """Points (P, 3) where phi changes its sign between two samples, by linear interpolation."""
+    """Return points (P, 3) where phi changes its sign between two samples, by linear interpolation."""
     found = []
     for axis in range(3):
         f = np.moveaxis(made.values, axis, -1)

@@ -1,7 +1,7 @@
-"""Which cells of a spline the surface is in, how far it is from all others, and how much phi bends near it.
+"""The cells of a spline that the surface is in, its distance from all others, and bounds of phi's bend near it.
 
 In a cell a cubic is between the least and the largest of its Bernstein coefficients, and so are its derivatives: their
-coefficients are differences of these: bounds that hold, not samples.
+coefficients are differences of these. These are bounds that hold, not samples.
 """
 
 import math
@@ -21,11 +21,11 @@ Places = NDArray[np.int64]
 
 # From the B-spline coefficients of a cell to its Bernstein coefficients, along one axis.
 _BERNSTEIN = np.array([[1.0, 4.0, 1.0, 0.0], [0.0, 4.0, 2.0, 0.0], [0.0, 2.0, 4.0, 0.0], [0.0, 1.0, 4.0, 1.0]]) / 6.0
-# Cells with coefficients that are looked at together.
+# Cells with Bernstein coefficients that are computed together
 _BATCH = 16_384
 # The clearance is known up to this many cells: a flight through empty space takes a step for each.
 _FARTHEST = 63
-# The columns of `bends`: the entries of a matrix in the order of `Symmetric`, and how far H is from it at most.
+# The columns of `bends`: the entries of a matrix in the order of `Symmetric`, and the bound of its distance from H.
 SPREAD, _COLUMNS = 6, 8
 # The two axes of each entry of a symmetric matrix.
 _SECOND = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
@@ -36,7 +36,7 @@ _PARTS = 4.0
 
 
 class SampleCells(Record):
-    """Each cell in few bytes: a flight comes through many."""
+    """Each cell in few bytes: a flight passes through many."""
 
     clear: Array  # uint8 (cells along x, y, z): 0 if the surface may be in it, else 1 + the clearance/unit
     unit: float  # [m]
@@ -45,13 +45,13 @@ class SampleCells(Record):
 
 
 def cells_of(coefficients: Floats, width: Floats) -> SampleCells:
-    """The `SampleCells` of a spline with these coefficients and this width (3,) of a cell [m]."""
+    """Return the `SampleCells` of a spline with these coefficients and this width (3,) of a cell [m]."""
     near = _near(coefficients)
     around = _grown(near)
     low, high = _bends(coefficients, width, around)
     rows = np.argwhere(near)
     unit = float(width.min()) / _PARTS
-    # Less a little for round-off; in C's order, as it comes out of a pickle, so that kernels are compiled once.
+    # Slightly less, for round-off; in C's order, as after a pickle, so that kernels are compiled once.
     clear = 1 + np.floor(_distance(around, width) * ((1.0 - 1e-5) / unit)).astype(np.uint8, order="C")
     clear[near] = 0
     row = np.zeros(near.shape, np.int32)
@@ -60,7 +60,7 @@ def cells_of(coefficients: Floats, width: Floats) -> SampleCells:
 
 
 def _near(c: Floats) -> Mask:
-    """The cells that the surface may be in."""
+    """Return the cells that the surface may be in."""
     low, high = c, c
     for axis in range(3):
         low, high = _window(low, axis, np.minimum), _window(high, axis, np.maximum)
@@ -78,7 +78,7 @@ def _holds_zero(low: Floats, high: Floats) -> Mask:
 
 
 def _window(values: Floats, axis: int, which: np.ufunc) -> Floats:
-    """The least or the largest of four neighbours along an axis."""
+    """Return the least or the largest of four neighbours along an axis."""
     v = np.moveaxis(values, axis, 0)
     return np.moveaxis(which(which(v[:-3], v[1:-2]), which(v[2:-1], v[3:])), 0, axis)
 
@@ -88,7 +88,7 @@ def _batches(places: Places) -> list[Places]:
 
 
 def bernstein(c: Floats, places: Places) -> Floats:
-    """The Bernstein coefficients (cells, 4, 4, 4) of the cells at these places (cells, 3)."""
+    """Return the Bernstein coefficients (cells, 4, 4, 4) of the cells at these places (cells, 3)."""
     four = np.arange(4)
     i, j, k = (places[:, axis, None] + four for axis in range(3))
     found = c[i[:, :, None, None], j[:, None, :, None], k[:, None, None, :]]
@@ -98,7 +98,7 @@ def bernstein(c: Floats, places: Places) -> Floats:
 
 
 def least_at_border(c: Floats, axis: int, end: int) -> float:
-    """A lower bound of phi where the grid begins along an axis (end 0) or ends (-1)."""
+    """Return a lower bound of phi where the grid begins along an axis (end 0) or ends (-1)."""
     layer = np.zeros([n - 3 for n in c.shape], np.bool_)
     layer[(slice(None),) * axis + (end,)] = True
     found = (np.take(bernstein(c, places), end, axis=1 + axis).min() for places in _batches(np.argwhere(layer)))
@@ -106,7 +106,7 @@ def least_at_border(c: Floats, axis: int, end: int) -> float:
 
 
 def _bends(c: Floats, width: Floats, of: Mask) -> tuple[Floats, Floats]:
-    """Bounds of the entries of H in these cells, (6, cells along x, y, z) each; of no value in the others."""
+    """Return bounds of the entries of H in these cells, (6, cells along x, y, z) each; undefined in all other cells."""
     low, high = np.full((6, *of.shape), np.inf), np.full((6, *of.shape), -np.inf)
     for places in _batches(np.argwhere(of)):
         index = (slice(None), *places.T)
@@ -115,7 +115,7 @@ def _bends(c: Floats, width: Floats, of: Mask) -> tuple[Floats, Floats]:
 
 
 def _bends_at(c: Floats, width: Floats, places: Places) -> tuple[Floats, Floats]:
-    """Those of the cells at these places, (6, cells) each."""
+    """Return the bounds of the cells at these places, (6, cells) each."""
     b = bernstein(c, places)
     low, high = np.empty((2, 6, len(places)))
     noise = 8.0 * COEFFICIENT * np.abs(b).reshape(len(places), -1).max(axis=1)
@@ -128,13 +128,13 @@ def _bends_at(c: Floats, width: Floats, places: Places) -> tuple[Floats, Floats]
 
 
 def _rows(low: Floats, high: Floats, places: Places) -> NDArray[np.float32]:
-    """`SampleCells.bends` of the cells at these places: bounds of each with its neighbours."""
+    """Return `SampleCells.bends` of the cells at these places: bounds of each with its neighbours."""
     all_low, all_high = low, high
     for axis in (1, 2, 3):
         all_low, all_high = _neighbours(all_low, axis, np.minimum), _neighbours(all_high, axis, np.maximum)
     index = (slice(None), *places.T)
     least, most = all_low[index].T, all_high[index].T
-    # H changes by no more than its range from one side of a cell to the other.
+    # From one side of a cell to its opposite side H changes by no more than its range.
     room = 4.0 * MARGIN * (most - least)
     least, most = least - room, most + room
     table = np.zeros((len(places), _COLUMNS), np.float32)
@@ -146,7 +146,7 @@ def _rows(low: Floats, high: Floats, places: Places) -> NDArray[np.float32]:
 
 
 def eigenvalues(cells: SampleCells) -> tuple[float, float]:
-    """The least and the largest eigenvalue of H where the surface is, at least and at most."""
+    """Return a lower bound of the least and an upper bound of the largest eigenvalue of H where the surface is."""
     bends = cells.bends.astype(np.float64)
     values, spread = np.linalg.eigvalsh(matrices_of(bends.T)), bends[:, SPREAD] * (1.0 + COEFFICIENT)
     return float((values[:, 0] - spread).min()), float((values[:, 2] + spread).max())
@@ -155,10 +155,10 @@ def eigenvalues(cells: SampleCells) -> tuple[float, float]:
 def most_bent_within(
     coefficients: Floats, width: Floats, cells: SampleCells, side: float, steepness: float
 ) -> tuple[float, float, float]:
-    """What makes the largest balls certain: (m, `known` of `ByFoot`, the smallest radius of curvature).
+    """The numbers that make the largest balls certain: (m, `known` of `ByFoot`, the smallest radius of curvature).
 
-    Of a spline, side 1 or -1, where |grad phi| on the surface is as large as the steepness: side H is at most m up to
-    twice `known` from the surface. Cells are looked at from the surface outwards, as far as a larger radius may come.
+    For a spline, side 1 or -1, where |grad phi| on the surface is as large as the steepness: side H is at most m up to
+    twice `known` from the surface. Cells are searched from the surface outwards, as far as a larger radius is possible.
     """
     found, most = (0.0, 0.0, 0.0), 0.0
     layer = np.maximum(cells.clear.astype(np.float64) - 1.0, 0.0) // _PARTS
@@ -175,7 +175,7 @@ def most_bent_within(
 
 
 def _largest_bend(low: Floats, high: Floats, side: float) -> float:
-    """The largest eigenvalue of side H at most, by bounds of its entries in cells; not below 0."""
+    """Return an upper bound of the largest eigenvalue of side H, by bounds of its entries in cells; not below 0."""
     middle, off = map(matrices_of, (0.5 * (low + high), 0.5 * (high - low)))
     # |E| is at most the largest sum of a row.
     values = np.linalg.eigvalsh(side * middle)[:, 2] + off.sum(axis=2).max(axis=1)
@@ -183,7 +183,7 @@ def _largest_bend(low: Floats, high: Floats, side: float) -> float:
 
 
 def _neighbours(values: Floats, axis: int, which: np.ufunc) -> Floats:
-    """The least or the largest of each cell and its two neighbours along an axis."""
+    """Return the least or the largest of each cell and its two neighbours along an axis."""
     v = np.moveaxis(values, axis, 0)
     found = v.copy()
     which(found[1:], v[:-1], out=found[1:])
@@ -192,14 +192,14 @@ def _neighbours(values: Floats, axis: int, which: np.ufunc) -> Floats:
 
 
 def _grown(cells: Mask) -> Mask:
-    """These cells and all around them."""
+    """Return these cells and all around them."""
     for axis in range(3):
         cells = _neighbours(cells, axis, np.logical_or)  # type: ignore[arg-type, assignment]
     return cells
 
 
 def _distance(grown: Mask, width: Floats) -> NDArray[np.float32]:
-    """The least distance of each cell from those that `grown` was grown from: as far as centres are from `grown`."""
+    """A lower bound of the distance of each cell from the cells before `grown`: that of its centre from `grown`."""
     farthest = float(_FARTHEST * width.min())
     squares = np.where(grown, np.float32(0.0), np.float32(farthest * farthest))
     for axis in range(3):

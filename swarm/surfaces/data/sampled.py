@@ -25,13 +25,13 @@ from .sample_cells import SampleCells, cells_of, eigenvalues, least_at_border, m
 from .sampled_numbers import SampledNumbers
 from .spline import Spline
 
-# A spline that changes its sign between two samples of the same sign, by more than this part of what phi changes in a
-# cell where it does most, has a feature that the samples do not resolve; by less, as next to an edge, it is a ripple.
+# A spline that changes its sign between two samples of the same sign has a feature that the samples do not resolve if
+# it goes beyond 0 by more than this part of the largest change of phi in a cell; less, as next to an edge, is a ripple.
 _RIPPLE = 0.1
-# Of what phi changes in a cell where it does most: a sample that is nearer to 0 is on the surface, whatever sign its
-# round-off has. That of meshes in float32 is 1e-7 of their size.
+# A sample nearer to 0 than this part of the largest change of phi in a cell is on the surface, for any sign of its
+# round-off. The round-off of meshes in float32 is 1e-7 of their size.
 _ON = 1e-4
-# Places at which the gradient on the surface is looked at, at most about so many at first.
+# At first at most about this number of places are tested for the gradient on the surface.
 _MOST_POINTS = 4096
 # The width of a cell along an axis on which phi does not depend [m]: no particle leaves it.
 _ENDLESS = 1e150
@@ -54,14 +54,14 @@ class Sampled(Parallel):
         values: phi (nx, ny, nz), four or more along each axis, in any unit: below 0 inside, above 0 outside. Or the
             path of a .npy file, or of an HDF5 file with one such dataset.
         spacing: between samples [m], one number or three.
-        origin: where values[0, 0, 0] is, three numbers [m].
+        origin: the place of values[0, 0, 0], three numbers [m].
         side: "inside" or "outside", the admissible part.
         rotation: about the middle of the grid.
-        mesh_error: how far the surface is from the mesh that it was made from [m]; None: from none.
-        mesh_weld: how far corners of that mesh were moved at most to close its seams [m]; None: none were.
+        mesh_error: the distance of the surface from the mesh that it was made from [m]; None: it was made from none.
+        mesh_weld: how far corners of that mesh were moved at most to close its seams [m]; None: none were moved.
 
     Where the surface reaches the border of the grid, other surfaces, or the plane of the scene, must keep particles in
-    the grid. Samples that are all the same along an axis are those of a cylinder, which has no normal along it.
+    the grid. Samples that do not change along an axis are those of a cylinder, which has no normal along it.
 
     Raises:
         SceneError: an argument is out of its range, the file cannot be read, a sample is not finite, all have the same
@@ -83,7 +83,7 @@ class Sampled(Parallel):
     side: str = "inside"
     mesh_error: float | None = field(default=None, kw_only=True)
     mesh_weld: float | None = field(default=None, kw_only=True)
-    # What is made of the samples, also for a copy with another side or place.
+    # The `Samples`, shared with copies that have another side or place.
     _made: Any = field(default=None, kw_only=True, compare=False, metadata={"in_file": False})
 
     def __post_init__(self) -> None:
@@ -91,12 +91,12 @@ class Sampled(Parallel):
         if self._made is None or self._made.values is not self.values or self._made.spacing != self.spacing:
             object.__setattr__(self, "values", _samples(self.values))
             if self.mesh_error is None:
-                # What is thin in a mesh is looked up in the mesh; next to its edges a spline has larger ripples.
+                # Thin walls are searched in the mesh itself; next to its edges a spline has larger ripples.
                 _require_resolved(self.values, np.array(self.spacing), np.array(self.origin))
             object.__setattr__(self, "_made", Samples(self.values, self.spacing))
 
     def __repr__(self) -> str:
-        """The number of samples, and their place."""
+        """Return the number of samples, and their place."""
         shape = " x ".join(map(str, self.values.shape))
         own = [one for one in fields(self) if one.name in ("spacing", "origin", "side", "mesh_error", "mesh_weld")]
         return self._call([f"<{shape}>"], [*own, *fields(Surface)])
@@ -140,7 +140,7 @@ class Sampled(Parallel):
         return self._placed(low - endless, high + endless)
 
     def known_in(self) -> Box | None:
-        """The box outside of which nothing is known of the surface; None: it is nowhere else."""
+        """The box outside of which the surface is not known; None: there is no surface outside."""
         everywhere = self._made.is_closed and not self._made.endless.any()
         return None if everywhere else self._placed(np.zeros(3), self._made.widths)
 
@@ -163,7 +163,7 @@ class Sampled(Parallel):
 
 
 class Samples:
-    """The samples of a surface and all that is made of them, once."""
+    """The samples of a surface and all that is derived from them, once."""
 
     def __init__(self, values: Floats, spacing: Vector) -> None:
         self.values, self.spacing = values, spacing
@@ -173,7 +173,7 @@ class Samples:
         self.steepness = float(max(np.abs(np.diff(values, axis=k)).max() / width[k] for k in range(3)))
 
     def spline(self, low: Floats) -> Spline:
-        """The spline with its first sample at a place."""
+        """Return the spline with its first sample at a place."""
         # Along an axis on which phi does not depend, all points are at the first sample of one cell.
         width, cells = np.where(self.endless, _ENDLESS, self.spacing), np.array(self.values.shape) - 1.0
         first, wide, inverse, shape = (
@@ -183,7 +183,7 @@ class Samples:
 
     @cached_property
     def least_steep(self) -> tuple[float, Floats]:
-        """The least |grad phi| on the surface, and where, from the first sample on."""
+        """The least |grad phi| on the surface, and its place relative to the first sample."""
         spline = self.spline(np.zeros(3))
         places = np.argwhere(self.cells.clear == 0)
         points = ((places[:: 1 + len(places) // _MOST_POINTS] + 0.5) * np.array(self.spacing)).T
@@ -199,35 +199,35 @@ class Samples:
 
     @cached_property
     def roundness(self) -> list[tuple[float, float, float]]:
-        """What `most_bent_within` says of a cavity and of a solid."""
+        """The results of `most_bent_within` for a cavity and for a solid."""
         width, (steepness, _where) = np.array(self.spacing), self.least_steep
         return [most_bent_within(self.coefficients, width, self.cells, side, steepness) for side in (1.0, -1.0)]
 
     @cached_property
     def cells(self) -> SampleCells:
-        """Which cells the surface is in, and how far it is from the others."""
+        """The cells that the surface is in, and its distance from all other cells."""
         return cells_of(self.coefficients, np.array(self.spacing))
 
     @cached_property
     def most_bent(self) -> tuple[float, float]:
-        """The least eigenvalue of H, and of -H, anywhere on the surface, at least."""
+        """Lower bounds of the least eigenvalue of H, and of -H, anywhere on the surface."""
         least, most = eigenvalues(self.cells)
         return least, -most
 
     @cached_property
     def endless(self) -> NDArray[np.bool_]:
-        """Along which axes all samples are the same, so that the surface is a cylinder."""
+        """The axes along which all samples are the same, so that the surface is a cylinder."""
         return np.array([not np.diff(self.values, axis=k).any() for k in range(3)])
 
     @cached_property
     def is_closed(self) -> bool:
-        """Whether phi is above 0 all over the border of the grid, of a cylinder but for its ends."""
+        """Whether phi is above 0 all over the border of the grid, except at the ends of a cylinder."""
         across = np.flatnonzero(~self.endless).tolist()
         return all(least_at_border(self.coefficients, k, end) > 0.0 for k in across for end in (0, -1))
 
     @cached_property
     def inner_box(self) -> tuple[Floats, Floats]:
-        """Corners of a box around all points where phi is below 0, from the first sample on."""
+        """Corners of a box around all points where phi is below 0, relative to the first sample."""
         inside = self.cells.clear == 0
         for corner in np.ndindex(2, 2, 2):
             part = tuple(slice(k, n - 1 + k) for k, n in zip(corner, self.values.shape, strict=True))
@@ -241,7 +241,7 @@ class Samples:
 
 
 def _samples(values: Any) -> Floats:
-    """The argument `values`, checked: an array or a path."""
+    """Return the argument `values`, checked: an array or a path."""
     if isinstance(values, str | Path):
         values = read_samples(values)
     found = checks.array("values", values)
@@ -273,7 +273,7 @@ def _require_resolved(values: Floats, width: Floats, origin: Floats) -> None:
         f = np.moveaxis(values, axis, 0)
         c = spline.along(f, 0)
         first, last = f[:-1], f[1:]
-        # The Bernstein coefficients of an edge, between which a cubic is
+        # The Bernstein coefficients of an edge, which bound a cubic
         second, third = (4.0 * c[1:-2] + 2.0 * c[2:-1]) / 6.0, (2.0 * c[1:-2] + 4.0 * c[2:-1]) / 6.0
         most = np.abs(np.diff(f, axis=0)).max()
         ripple, on = _RIPPLE * most, _ON * most

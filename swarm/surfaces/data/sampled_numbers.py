@@ -1,8 +1,8 @@
-"""A sampled surface as kernels take it: its level set, what is known of its cells, and flights from cell to cell.
+"""The numbers of a sampled surface: its level set, the bounds in its cells, and flights from cell to cell.
 
-Far from the surface a step goes as far as it surely does not reach it, or to the wall of the cell. Near it a step ends
-where a parabola above the level rises through 0, with the bounds of its bend in the cells around, or where it leaves
-these: no root is skipped.
+Far from the surface a step is as long as the surface surely does not allow a hit, or as the way to the wall of the
+cell. Near it a step ends where a parabola above the level rises through 0, with the bounds of its bend in the cells
+around, or where the flight leaves these cells: no root is skipped.
 """
 
 import math
@@ -22,18 +22,18 @@ from ..time_of_impact.march import LOOKS, SafeStep, lets_go
 from .sample_cells import SPREAD, SampleCells
 from .spline import Spline
 
-# Cells without the surface that a straight flight comes through in one go.
+# The most cells without the surface that a straight flight passes at once
 _MANY = 200
-# A flight that is past the wall by so many times the round-off of its place is at it.
+# A flight that is past the wall by at most this many times the round-off of its place is at the wall.
 _ROUND_OFF = 8.0
 
 
 class SampleCell(NamedTuple):
-    """The cell of a point, from where on, and what is known of it; `inside` is whether it is one of the grid."""
+    """The cell of a point, its corner, and its bounds; `inside` is whether it is a cell of the grid."""
 
     low: Vec  # in cells from the corner of the grid
-    row: int  # of what is known of the bend there
-    clear: float  # how far from the surface at least [m], below 0 where it may be in the cell
+    row: int  # the row of its bounds of the bend
+    clear: float  # a lower bound of the distance from the surface [m], below 0 where the surface may be in the cell
     inside: bool
 
 
@@ -61,7 +61,7 @@ def _layers(low, around, count):
 
 
 def _time_out(first, width, layers, x, v, pull):
-    """When a coordinate leaves some layers of cells."""
+    """Return when a coordinate leaves some layers of cells."""
     low, high = first + layers[0] * width, first + layers[1] * width
     if pull == 0.0:
         return select(v != 0.0, (select(v > 0.0, high, low) - x) / select(v != 0.0, v, 1.0), math.inf)
@@ -69,14 +69,14 @@ def _time_out(first, width, layers, x, v, pull):
 
 
 def _time_in(low, high, x, v, pull):
-    """Before when a coordinate is surely not in an interval."""
+    """Return the time before which a coordinate is surely not in an interval."""
     if x < low:
         return rise_time(x - low, 0.5 * v, 0.5 * pull)
     return rise_time(high - x, -0.5 * v, -0.5 * pull) if x > high else 0.0
 
 
 def _known(bends, i):
-    """The matrix A of a row of `bends`, and how far H is from it."""
+    """Return the matrix A of a row of `bends`, and the bound of its distance from H."""
     a = Symmetric(
         _at(bends, i, 0), _at(bends, i, 1), _at(bends, i, 2), _at(bends, i, 3), _at(bends, i, 4), _at(bends, i, 5)
     )
@@ -93,18 +93,18 @@ def _inverse(x):
 
 
 def _least_of(a):
-    """The least component."""
+    """Return the least component."""
     return min(a.x, a.y, a.z)
 
 
 class SampledNumbers(contract.Smooth):
-    """A sampled surface as kernels take it."""
+    """The numbers of a sampled surface."""
 
     spline: Spline
     cells: SampleCells
     side: float
     closed: float  # 1 if there is no surface outside of the grid
-    least: float  # the least eigenvalue of side H anywhere on the surface, at least
+    least: float  # a lower bound of the least eigenvalue of side H anywhere on the surface
 
     def phi(self, r):
         return self.spline.value(r)
@@ -146,7 +146,7 @@ class SampledNumbers(contract.Smooth):
         return SampleCell(low, int(cells.row[i, j, k]), (float(cells.clear[i, j, k]) - 1.0) * cells.unit, inside)
 
     def _until_out(self, low, around, r, v, pull):
-        """When a flight is beyond a cell and so many cells around it, as far as they are in the grid."""
+        """Return when a flight is beyond a cell and `around` cells around it, as far as they are in the grid."""
         made = self.spline
         x = _time_out(made.low.x, made.width.x, _layers(low.x, around, made.shape.x), r.x, v.x, pull.x)
         y = _time_out(made.low.y, made.width.y, _layers(low.y, around, made.shape.y), r.y, v.y, pull.y)
@@ -155,7 +155,7 @@ class SampledNumbers(contract.Smooth):
 
     @outlined
     def _until_in(self, r, v, pull):
-        """Until when a flight from outside of the grid is surely outside; infinite if for ever."""
+        """Return until when a flight from outside of the grid is surely outside; infinite if for ever."""
         low, width, n = self.spline.low, self.spline.width, self.spline.shape
         x = _time_in(low.x, low.x + n.x * width.x, r.x, v.x, pull.x)
         y = _time_in(low.y, low.y + n.y * width.y, r.y, v.y, pull.y)
@@ -164,10 +164,10 @@ class SampledNumbers(contract.Smooth):
 
     @outlined
     def _through_empty(self, r, v, t):
-        """The time from t on at which a straight flight comes to a cell where the surface may be, or out of the grid.
+        """Return the time from t on when a straight flight reaches a cell where the surface may be, or leaves the grid.
 
         A step is as long as the clearance or as the way out of the cell, in units of cells, and without a branch: most
-        of the steps of a flight are these.
+        of the steps of a flight are of this kind.
         """
         made, cells = self.spline, self.cells
         u, w, n = times(r - made.low, made.inverse), times(v, made.inverse), made.shape
@@ -186,7 +186,7 @@ class SampledNumbers(contract.Smooth):
         return t
 
     def _free_time(self, cell, r, v, pull):
-        """A time in which a flight surely meets no surface, from outside of the grid or from a cell that has none."""
+        """A time in which a flight surely meets no surface, from outside of the grid or from a cell without it."""
         if not cell.inside:
             return self._until_in(r, v, pull) if self.closed > 0.0 else math.inf
         if cell.clear > 0.0:
@@ -197,7 +197,7 @@ class SampledNumbers(contract.Smooth):
 
     @outlined
     def hessian_bounds(self, r):
-        """Bounds of the eigenvalues of side H: see `Smooth.bend`."""
+        """Return bounds of the eigenvalues of side H: see `Smooth.bend`."""
         cell, width = self._cell_of(r), self.spline.width
         if cell.clear >= 0.0 or not cell.inside:
             return 0.0, 0.0, 0.0
@@ -210,7 +210,7 @@ class SampledNumbers(contract.Smooth):
 
     @outlined
     def clearance(self, r):
-        """The distance to the surface at least; next to its cells, to the wall of the cell."""
+        """Return a lower bound of the distance to the surface; next to its cells, to the wall of the cell."""
         cell, width = self._cell_of(r), self.spline.width
         if not cell.inside:
             return self.closed * max(norm(self.spline.place(r).off), MARGIN * _least_of(width))
@@ -233,12 +233,12 @@ class SampledNumbers(contract.Smooth):
         p, w = r + t * (v + (0.5 * t) * pull), v + t * pull
         cell = self._cell_of(p)
         if not cell.inside or cell.clear >= 0.0:
-            # Round-off must not leave it where it is for ever.
+            # Round-off must not keep the flight at one place for ever.
             return SafeStep(t, max(self._free_time(cell, p, w, pull), EPSILON * t), -1.0, -1.0)
         value, n = self.spline.value_and_slope(p)
         level, half = self.side * value, 0.5 * self.side * dot(n, w)
         speed, room = norm(w), 2.0 * EPSILON * total(self.spline.coordinates(p))
-        # Within round-off of the wall and not on its way off it: nothing nearer is to be found.
+        # Within round-off of the wall and not on its way off: no nearer place is to be found.
         noise = _ROUND_OFF * room * norm(n)
         if not is_first and half >= 0.0 and level >= -noise:
             return SafeStep(t, 0.0, 0.0, select(level <= noise, -1.0, 0.0))
@@ -247,8 +247,8 @@ class SampledNumbers(contract.Smooth):
         if lets_go(level, half, step, slack):
             step, _out, _bent_there = self._safe_step(cell, LevelAndSlope(-slack, half, n), p, w, pull)
             return SafeStep(t, step, -1.0, -1.0)
-        # What is left of the level after the step is at most (most - least) step^2, and half of its slope there at
-        # least this.
+        # After the step the level is at most (most - least) step^2 from 0, and half of its slope there is at least
+        # this.
         rising, remaining = half + bent.least * step, (bent.most - bent.least) * step * step
         arrives = speed * step + 0.5 * g * step * step <= room or remaining * (speed + g * step) <= 2.0 * room * rising
         arrives = step < out and arrives and (not is_first or rising > 0.0 or step == 0.0)
@@ -270,8 +270,8 @@ class SampledNumbers(contract.Smooth):
         return step
 
     def _safe_step(self, cell, here, r, v, pull):
-        """(a time for which a flight surely stays admissible, within which its bounds hold, these as `SlopeRange`)."""
-        # A short straight step stays in the cells around, which is cheaper to know than when it leaves them.
+        """(a time while a flight surely stays admissible, a time while its bounds hold, the bounds as `SlopeRange`)."""
+        # A short straight step stays in the cells around, which costs less than to compute when it leaves them.
         speed, falls = norm(v), norm(pull) > 0.0
         out = _least_of(self.spline.width) / speed if speed > 0.0 else 0.0
         bent = self._bent(cell.row, here.slope, v, pull, 0.0)
@@ -288,7 +288,7 @@ class SampledNumbers(contract.Smooth):
         return step, out, bent
 
     def _bent(self, row, n, v, pull, time):
-        """`SlopeRange` around a cell for so long, with the gradient and the velocity now."""
+        """Return the `SlopeRange` around a cell up to `time`, with the gradient and the velocity now."""
         # w.H w + grad phi.G/2 with w = v + G t, grad phi = n + 2 H (v t + G t^2/2) and |H - A| at most the spread
         a, spread = _known(self.cells.bends, row)
         now, falls = dot(v, applied(a, v)) + 0.5 * dot(n, pull), norm(pull) * time

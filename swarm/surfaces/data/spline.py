@@ -15,7 +15,7 @@ from ...kernel.record import Record
 from ...kernel.vector import Symmetric, Vec, absolute, norm, times
 from ...state import Floats
 
-# Samples along each axis, at least: the ends of the spline take four.
+# The least number of samples along each axis: the ends of the spline take four.
 LEAST = 4
 
 
@@ -23,7 +23,7 @@ LEAST = 4
 
 
 def coefficients(values: Floats) -> Floats:
-    """The coefficients of the spline through samples, along each axis."""
+    """Return the coefficients of the spline through samples, along each axis."""
     found = values
     for axis in range(3):
         found = along(found, axis)
@@ -31,7 +31,7 @@ def coefficients(values: Floats) -> Floats:
 
 
 def along(values: Floats, axis: int) -> Floats:
-    """The coefficients of the splines along one axis, in which the outermost two cells share one polynomial.
+    """Return the coefficients of the splines along one axis; the outermost two cells share one polynomial.
 
     (c[i] + 4 c[i+1] + c[i+2])/6 = f[i]; with c[0] - 4 c[1] + 6 c[2] - 4 c[3] + c[4] = 0 the third derivative has no
     jump next to the end ("not a knot"), and the error is of order 4 up to it.
@@ -59,7 +59,7 @@ def along(values: Floats, axis: int) -> Floats:
 
 
 class SplinePlace(NamedTuple):
-    """The cell of a point, where in it the point is, from 0 to 1, and how far outside of the grid."""
+    """The cell of a point, its place in the cell from 0 to 1, and its distance outside of the grid along each axis."""
 
     x: Any
     y: Any
@@ -69,7 +69,7 @@ class SplinePlace(NamedTuple):
 
 
 def _within(u, count):
-    # As far as a flight goes beyond a cell that it leaves
+    # As far as a flight passes beyond a cell that it leaves
     return np.minimum(np.maximum(u, -MARGIN), count + MARGIN)
 
 
@@ -81,7 +81,7 @@ def _whole(u, count):
 
 
 def basis(t):
-    """The basis functions at a place in the cell."""
+    """Return the basis functions at a place in the cell."""
     s = 1.0 - t
     sixth = 1.0 / 6.0
     return Four(
@@ -93,19 +93,19 @@ def basis(t):
 
 
 def _slopes(t):
-    """Their derivatives."""
+    """Return the derivatives of the basis functions."""
     s = 1.0 - t
     return Four(-0.5 * s * s, 0.5 * t * (3.0 * t - 4.0), 0.5 * s * (4.0 - 3.0 * s), 0.5 * t * t)
 
 
 def _bends(t):
-    """Their second derivatives."""
+    """Return the second derivatives of the basis functions."""
     s = 1.0 - t
     return Four(s, t - 2.0 * s, s - 2.0 * t, t)
 
 
 def _steps(t0, t1, d):
-    """The basis functions at t1 less those at t0, without cancellation; d is t1 - t0."""
+    """Return the basis functions at t1 less those at t0, without cancellation; d is t1 - t0."""
     s0, s1 = 1.0 - t0, 1.0 - t1
     sixth = 1.0 / 6.0
     squares, cubes = t0 + t1, t1 * t1 + t1 * t0 + t0 * t0
@@ -124,12 +124,12 @@ class Spline(Record):
     low: Vec
     width: Vec  # of a cell
     inverse: Vec  # 1/width
-    shape: Vec  # how many cells along x, y, z
-    steepness: float  # by which phi rises outside of the grid, with the distance from it
+    shape: Vec  # the number of cells along x, y, z
+    steepness: float  # the slope of phi outside of the grid, with the distance from it
     coefficients: Array
 
     def place(self, r):
-        """The `SplinePlace` of a point, or of the nearest point of the grid."""
+        """Return the `SplinePlace` of a point, or of the nearest point of the grid."""
         u, n = times(r - self.low, self.inverse), self.shape
         c = Vec(_within(u.x, n.x), _within(u.y, n.y), _within(u.z, n.z))
         cell = Vec(_whole(c.x, n.x), _whole(c.y, n.y), _whole(c.z, n.z))
@@ -137,12 +137,12 @@ class Spline(Record):
         return SplinePlace(np.int64(cell.x), np.int64(cell.y), np.int64(cell.z), c - cell, times(u - c, self.width))
 
     def value_and_slope(self, r):
-        """phi and its gradient."""
+        """Return phi and its gradient."""
         place, table, k = self.place(r), self.coefficients, self.inverse
         x, y, z = basis(place.at.x), basis(place.at.y), basis(place.at.z)
         column, across = over_block(table, place, x, y), over_block(table, place, _slopes(place.at.x), y)
         sideways = over_block(table, place, x, _slopes(place.at.y))
-        # Outside of the grid phi goes on with the value at its border, and rises.
+        # Outside of the grid phi is its value at the border, plus a rise with the distance.
         away, inside = norm(place.off), Vec(place.off.x == 0.0, place.off.y == 0.0, place.off.z == 0.0)
         further = (place.off / np.maximum(away, TINY)) * self.steepness
         slope = Vec(
@@ -154,14 +154,14 @@ class Spline(Record):
 
     @outlined
     def value(self, r):
-        """phi alone."""
+        """Return phi alone."""
         place = self.place(r)
         column = over_block(self.coefficients, place, basis(place.at.x), basis(place.at.y))
         return sum_of(basis(place.at.z), column) + self.steepness * norm(place.off)
 
     @outlined
     def half_bend(self, r):
-        """H = grad grad phi/2."""
+        """Return H = grad grad phi/2."""
         place, table, k = self.place(r), self.coefficients, self.inverse
         x, y, z = basis(place.at.x), basis(place.at.y), basis(place.at.z)
         dx, dy, dz = _slopes(place.at.x), _slopes(place.at.y), _slopes(place.at.z)
@@ -176,7 +176,7 @@ class Spline(Record):
 
     @outlined
     def difference(self, r0, r1):
-        """phi(r1) - phi(r0), without cancellation where both are in one cell."""
+        """Return phi(r1) - phi(r0), without cancellation where both are in one cell."""
         a, b = self.place(r0), self.place(r1)
         same = a.x == b.x and a.y == b.y and a.z == b.z
         inside = norm(a.off) == 0.0 and norm(b.off) == 0.0
@@ -190,5 +190,5 @@ class Spline(Record):
         return along_x + along_y + sum_of(_steps(a.at.z, b.at.z, d.z), over_block(table, a, x0, y0))
 
     def coordinates(self, r):
-        """The magnitudes of those that round a point, in the scene and in the grid: near its origin these are more."""
+        """The magnitudes that round a point: its coordinates in the scene and, larger near its origin, in the grid."""
         return absolute(r) + absolute(r - self.low)

@@ -4,13 +4,13 @@ The signed distance is -t/2 in the middle of a wall of thickness t and rises by 
 the wall, the spline through the samples may be above 0 in it: particles leak. By the largest value that the spline of
 the distance from a plane takes on that plane, 0.3415 h for samples h apart (planes halfway between samples along an
 axis), a flat wall is whole from t = 0.683 h on. Walls and gaps that alternate, each t thick, are a wave of the length
-2 t, which samples resolve for t > h. RESOLVED leaves a quarter of that for walls that are bent.
+2 t, which samples resolve for t > h. RESOLVED adds a quarter to that for walls that are bent.
 
 Not every thin place is a wall that leaks. Towards the edge of a wedge the thickness is 0, and an engraved letter is
-thinner than samples need to be: what is lost there becomes round, as all edges do. So what counts is the part of the
-surface around a thin place that joins its two sides. If this part is a disc, folded about a near edge, the surface
-without the fold is still one piece. If no part joins the two sides, the wall goes on. If the part is no disc (a wire, a
-narrow bore, a grain), samples would cut something or close it.
+thinner than samples need to be: such a part is lost and becomes round, as all edges do. So the part of the surface
+around a thin place that joins its two sides decides. If this part is a disc, folded about a near edge, the surface
+without the fold is still one piece. If no part joins the two sides, the wall continues. If the part is no disc (a wire,
+a narrow bore, a grain), samples would cut or close a passage.
 """
 
 from pathlib import Path
@@ -29,21 +29,21 @@ from ..surface import shown
 
 # The thickness that is resolved, in spacings.
 RESOLVED = 1.25
-# Points of the mesh at which its thickness is found, on the square of the spacing; each triangle has one at least.
+# Points of the mesh at which its thickness is measured, for a square of the spacing; each triangle has at least one.
 _DENSITY = 4.0
-# The two sides of a wall are turned from each other by less: of a wedge that is as blunt as this, less than two
-# spacings are thinner than RESOLVED.
+# The two sides of a wall are turned from each other by less than this: in a wedge that is as blunt as this, less than
+# two spacings are thinner than RESOLVED.
 _FACING = np.cos(np.radians(45.0))
 # Sides that are turned by less than this do not meet in an edge, as far as a mesh shows.
 _WEDGE = np.sin(np.radians(5.0))
 # A fold that ends within this many spacings becomes round.
 _ROUND = 2.0
-# Of the way to the edge of a wedge, how far around its middle the surface is looked at.
+# The surface is examined around the middle of a wedge as far as this part of the way to its edge.
 _AROUND = 0.6
 # Radii of the balls that are examined, relative to the radius that should do. If a ball crosses the three edges of a
-# corner but leaves out the corner, the part of the surface in it has a hole, which is absent for another radius.
+# corner without the corner, the part of the surface in it has a hole, which is absent for another radius.
 _BALLS = (1.0, 1.5)
-# Of a distance, more than round-off.
+# A part of a distance above its round-off.
 _CLOSE = 1e-6
 # Steps from a first ball to the one that touches both sides; none is needed where these are parallel.
 _STEPS = 3
@@ -52,14 +52,14 @@ _EVEN = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 class _Thin(NamedTuple):
-    """Thin places: of each a point of the mesh and one of the other side."""
+    """Thin places: for each a point of the mesh and a point of the opposite side."""
 
     point: Floats
     other: Floats
     at: Indices  # the triangle of the point
-    to: Indices  # that of the other
+    to: Indices  # the triangle of the point on the opposite side
     thickness: Floats
-    gap: NDArray[np.bool_]  # of a gap, not of a wall
+    gap: NDArray[np.bool_]  # whether it is a gap, not a wall
 
 
 def require_resolved(path: Path, mesh: Soup, spacing: float) -> None:
@@ -69,7 +69,7 @@ def require_resolved(path: Path, mesh: Soup, spacing: float) -> None:
     if not len(thin.point):
         return
     surface, first, enough = _Surface(mesh, normals, spacing), None, spacing
-    # With a smaller spacing a fold that was short for the first may be a long one.
+    # With a smaller spacing a fold that was short for the first spacing may be long.
     while (worst := _thinnest(thin, surface, enough)) is not None:
         first = worst if first is None else first
         enough = float(thin.thickness[worst]) / RESOLVED * (1.0 - _CLOSE)
@@ -83,15 +83,15 @@ def require_resolved(path: Path, mesh: Soup, spacing: float) -> None:
 
 
 def _down(value: float) -> float:
-    """A number of three digits that is not above this one."""
+    """Return a number of three digits that is not above this one."""
     unit = 10.0 ** (np.floor(np.log10(value)) - 2.0)
     return float(f"{np.floor(value / unit) * unit:.2e}")
 
 
 def _thinnest(thin: _Thin, surface: "_Surface", spacing: float) -> int | None:
-    """The thinnest place that samples this far apart do not resolve."""
+    """Return the thinnest place that samples this far apart do not resolve."""
     found = np.flatnonzero(thin.thickness < RESOLVED * spacing)
-    # Of each cell one place is enough: that with the most parallel sides, as those of a wall are.
+    # For each cell one place is enough: the place with the most parallel sides, as a wall has.
     facing = (surface.normals[thin.at[found]] * surface.normals[thin.to[found]]).sum(axis=1)
     found = found[np.argsort(facing, kind="stable")]
     cells = np.column_stack([np.floor(thin.point[found] / (_ROUND * spacing)), thin.gap[found]])
@@ -104,7 +104,7 @@ def _thinnest(thin: _Thin, surface: "_Surface", spacing: float) -> int | None:
 
 
 def _normals(mesh: Soup) -> tuple[Floats, Floats]:
-    """The unit normals (T, 3) and the areas (T,) of the triangles."""
+    """Return the unit normals (T, 3) and the areas (T,) of the triangles."""
     a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
     normals = np.cross(b - a, c - a)
     twice = np.linalg.norm(normals, axis=1)
@@ -112,10 +112,10 @@ def _normals(mesh: Soup) -> tuple[Floats, Floats]:
 
 
 def _thin_places(mesh: Soup, normals: Floats, areas: Floats, spacing: float) -> _Thin:
-    """The place where a ball that touches the mesh, as wide as a wall that is resolved, meets another side of it."""
+    """Return the places where a ball that touches the mesh, as wide as a resolved wall, meets an opposite side."""
     counts = np.maximum(np.ceil(_DENSITY * areas / spacing**2), 1.0).astype(np.int64)
     at = np.repeat(np.arange(len(areas)), counts)
-    # Across all triangles, not in each: small ones have one point.
+    # Across all triangles, not in each: small triangles have one point.
     u, v = ((np.arange(len(at))[:, None] + 0.5) * _EVEN % 1.0).T
     beyond = u + v > 1.0
     u, v = np.where(beyond, 1.0 - u, u)[:, None], np.where(beyond, 1.0 - v, v)[:, None]
@@ -138,9 +138,9 @@ def _thin_places(mesh: Soup, normals: Floats, areas: Floats, spacing: float) -> 
 def _touching(
     mesh: Soup, normals: Floats, at: Indices, points: Floats, toward: Floats, radius: Floats
 ) -> tuple[NDArray[np.bool_], Floats, Floats, Indices]:
-    """Whether balls that touch the mesh in points of these triangles meet a side that faces them.
+    """Return whether balls that touch the mesh in points of these triangles meet a side that faces them.
 
-    And the radius of the balls that only touch it, where they do, and the triangle there.
+    Return also the radius of the balls that just touch this side, the point and the triangle there.
     """
     with needed_by("from_mesh", "mesh"):
         import igl
@@ -188,7 +188,7 @@ class _Surface:
         return any(self._is_disc(middle, k * reach, int(thin.at[i]), int(thin.to[i])) for k in _BALLS)
 
     def _is_disc(self, centre: Floats, reach: float, first: int, last: int) -> bool:
-        """Whether two triangles are in one part of the surface in a ball, and that part is a disc."""
+        """Whether two triangles are in one part of the surface in a ball, and this part is a disc."""
         found = np.array(self.middles.query_ball_point(centre, reach + self.half), np.int64)
         crossed = ((self.low <= centre + reach) & (self.high >= centre - reach)).all(axis=1)
         near = np.concatenate([self.short[found], self.long[crossed]])
@@ -207,5 +207,5 @@ class _Surface:
         edges = self.edges[near[label[sides[:, 0]] == of_first]]
         corners = self.mesh.vertices[np.unique(edges)]
         inside = np.count_nonzero(((corners - centre) ** 2).sum(axis=1) <= reach**2)
-        # The pieces of triangles, edges and corners in a ball are convex, so that these numbers are Euler's.
+        # The pieces of triangles, edges and corners in a ball are convex: their numbers give Euler's characteristic.
         return bool(np.count_nonzero(label == of_first) - len(edges) + inside == 1)

@@ -12,14 +12,14 @@ class Absorb(WallLaw):
     """Absorption: with a probability at each impact, or by the energy of the motion along the normal.
 
     Args:
-        probability: in [0, 1]: so many particles that reach the wall are absorbed.
+        probability: the part of the particles that reach the wall that is absorbed, in [0, 1].
         barrier: energy E [J], 0 or more, in place of a probability. A particle is absorbed if the energy of its motion
             along the normal is larger, m (n.(v - u))^2/2 > E, as a neutron is above the optical potential of a wall.
-        loss: in [0, 1], with a barrier: so many of the others are absorbed too.
+        loss: with a barrier, the part of all other particles that is absorbed too, in [0, 1].
 
     A particle that is not absorbed leaves as from a mirror, or by the next law: `laws=[Absorb(0.01), Lambert()]`. A
-    particle that is absorbed ends where it is: `Result.absorbed_time`, the observable "absorbed" (frames, surfaces) and
-    a row in the log of impacts. The wall gets its normal momentum; its energy stays in the sums of all particles.
+    particle that is absorbed stays where it is: `Result.absorbed_time`, the observable "absorbed" (frames, surfaces)
+    and a row in the log of impacts. The wall gets its normal momentum; its energy stays in the sums of all particles.
 
     Raises:
         SceneError: by the surface: a number out of its range, or neither or both of a probability and a barrier.
@@ -39,7 +39,7 @@ class Absorb(WallLaw):
     loss: Any = None
 
     def check(self, name):
-        """One of a probability and a barrier, each in its range."""
+        """Raise unless one of a probability and a barrier is given, each in its range."""
         if (self.probability is None) == (self.barrier is None):
             both = "neither" if self.barrier is None else "both"
             raise SceneError(f"{name} must have a probability, or a barrier [J], got {both}")
@@ -53,7 +53,7 @@ class Absorb(WallLaw):
             require_probability(f"{name}.loss", self.loss)
 
     def leave(self, v, n, u, random, mass):
-        """As from a mirror, unless it is absorbed."""
+        """Reflect the particle as a mirror, unless it is absorbed."""
         if self.barrier is None:
             return Leave(mirrored(v, n, u), random.uniform(0) >= self.probability)
         b = dot(v - u, n)

@@ -26,8 +26,8 @@ class CercignaniLampis(WallLaw):
         w_n'^2 = |sqrt(1 - alpha_n) |w_n| + sqrt(-alpha_n ln U1) exp(2 pi i U2)|^2
         w_t' = (1 - sigma_t) w_t + sqrt(-sigma_t (2 - sigma_t) ln U3) (cos(2 pi U4), sin(2 pi U4))
 
-    so that <w_n'^2> = (1 - alpha_n) w_n^2 + alpha_n and <w_t'> = (1 - sigma_t) w_t. A gas of the wall's temperature
-    stays as it is: the kernel is reciprocal. In a scene with a plane w_t' has the one part along it.
+    so that <w_n'^2> = (1 - alpha_n) w_n^2 + alpha_n and <w_t'> = (1 - sigma_t) w_t. A gas at the wall's temperature
+    does not change: the kernel is reciprocal. In a scene with a plane w_t' has only the component along it.
 
     Raises:
         SceneError: by the surface: a number out of its range.
@@ -45,17 +45,17 @@ class CercignaniLampis(WallLaw):
     tangential: Any
 
     def check(self, name):
-        """Each number in its range."""
+        """Raise unless each number is in its range."""
         require_magnitude(f"{name}.temperature", self.temperature, "J")
         require_probability(f"{name}.normal", self.normal)
         require_part(f"{name}.tangential", self.tangential, _REVERSED)
 
     def leave(self, v, n, u, random, mass):
-        """u + w_n' n + w_t', by four numbers of two blocks of the stream."""
+        """Return u + w_n' n + w_t', by four numbers of two blocks of the stream."""
         w, speed2 = v - u, 2.0 * self.temperature / mass
         b = -dot(w, n)
         along = w + b * n
-        # What is drawn in a disc, on the part of w_n that is kept.
+        # The random vector in a disc is added to the part of w_n that is kept.
         kept, drawn = math.sqrt(1.0 - self.normal) * b, math.sqrt(-self.normal * speed2 * logarithm(random.uniform(0)))
         cosine, sine = circle(random.uniform(1))
         there, beside = kept + drawn * cosine, drawn * sine

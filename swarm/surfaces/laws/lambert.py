@@ -12,11 +12,11 @@ class Lambert(WallLaw):
     """Diffuse reflection that keeps the speed, by Lambert's cosine law.
 
     Args:
-        probability: in [0, 1]: so many particles leave diffusely, the others as from a mirror.
+        probability: the part of the particles that leave diffusely, in [0, 1]; all others leave as from a mirror.
 
-    A particle leaves with the speed, relative to the wall, with which it comes, in a direction at random: the
-    cosine to the normal, c, has the distribution c^2, and the azimuth is uniform: per solid angle that is c/pi. In a
-    scene with a plane the sine of the angle to the normal is uniform in (-1, 1). The speed is kept to the last digit.
+    A particle leaves with the speed, relative to the wall, with which it arrives, in a random direction: the cosine c
+    to the normal has the distribution c^2, and the azimuth is uniform: per solid angle that is c/pi. In a scene with a
+    plane the sine of the angle to the normal is uniform in (-1, 1). The speed is kept to the last digit.
 
     Raises:
         SceneError: by the surface: the probability is not in [0, 1].
@@ -35,13 +35,13 @@ class Lambert(WallLaw):
     probability: Any = 1.0
 
     def check(self, name):
-        """The probability is one."""
+        """Raise unless the probability is in [0, 1]."""
         require_probability(f"{name}.probability", self.probability)
 
     def leave(self, v, n, u, random, mass):
-        """|v - u| times a direction of the cosine law: the part of the first number below the probability is uniform.
+        """Return u + |v - u| times a direction of the cosine law: below the probability the first number is uniform.
 
-        So both numbers of one block of the stream do.
+        So two numbers, one block of the stream, suffice.
         """
         drawn = random.uniform(0)
         is_diffuse = drawn < self.probability

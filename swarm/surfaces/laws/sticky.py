@@ -5,16 +5,16 @@ from .law_numbers import require_magnitude
 
 
 class Sticky(WallLaw):
-    """Residence on the wall: a particle leaves after a time that is exponential with a mean, as from a mirror.
+    """Residence on the wall: a particle leaves as from a mirror, after a random time with an exponential distribution.
 
     Args:
         time: the mean residence time [s], 0 or more.
 
-    With another law it leaves by that: `laws=[Lambert(), Sticky(1e-3)]`. In files and observables a particle that waits
-    is at its place on the wall, with the velocity with which it will leave: its energy and momentum are those after the
-    impact. The log of impacts has the time of the impact. A particle costs nothing in frames in which it waits.
-    With `Penalty` it leaves at the start of a step. A ball or a grain that waits is a fixed sphere for others. The
-    scene must have no motion, and the wall no mass; where particles have a radius no wall has one.
+    With another law it leaves by that law: `laws=[Lambert(), Sticky(1e-3)]`. In files and observables a particle that
+    waits is at its place on the wall, with the velocity with which it will leave: its energy and momentum are those
+    after the impact. The log of impacts has the time of the impact. A waiting particle costs nothing in frames in which
+    it waits. With `Penalty` it leaves at the start of a step. A ball or a grain that waits is a fixed sphere for
+    others. The scene must have no motion, and the wall no mass; where particles have a radius no wall may have a mass.
 
     Raises:
         SceneError: by the surface: a time below 0; by the run: a wall moves.
@@ -30,9 +30,9 @@ class Sticky(WallLaw):
     time: float
 
     def check(self, name):
-        """A time of 0 or more."""
+        """Raise unless the time is 0 or more."""
         require_magnitude(f"{name}.time", self.time, "s")
 
     def leave(self, v, n, u, random, mass):
-        """As from a mirror, after a time."""
+        """Reflect the particle as a mirror, after a random time."""
         return Leave(mirrored(v, n, u), wait=self.time * random.exponential(0))

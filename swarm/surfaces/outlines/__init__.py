@@ -1,1 +1,1 @@
-"""Outlines of lines and arcs: what they are, and the walls that stand on them."""
+"""Outlines of lines and arcs, and the walls that stand on them."""

@@ -1,9 +1,9 @@
-"""A closed outline of lines and arcs: its sides, its area and length, and how far points are from it.
+"""A closed outline of lines and arcs: its sides, its area and length, and the distance of points from it.
 
-It is given as in DXF: a vertex is x and y, and a third number says how the side that begins there bulges: tan(angle/4)
-of the arc, 0 a line, 1 a half circle; above 0 it turns to the left, which is outwards where the vertices go round
-counter-clockwise. Edges are written with n, the unit normal out of the outline at their start a, and a curvature k:
-they are where n.d + k/2 |d|^2 = 0 with d = r - a; its value is the distance to first order.
+It is given as in DXF: a vertex is x and y, and a third number, the bulge of the side that begins there: tan(angle/4) of
+the arc, 0 a line, 1 a half circle; above 0 the side turns to the left, which is outwards where the vertices go round
+counter-clockwise. An edge has n, the unit normal out of the outline at its start a, and a curvature k: it is where n.d
++ k/2 |d|^2 = 0 with d = r - a; this level is the distance to first order.
 """
 
 import math
@@ -22,25 +22,25 @@ Row = tuple[float, ...]
 
 # A length, or a distance, up to this part of the extent counts as 0; two sides with a sine up to this have no corner.
 _NOTHING, _SMOOTH = 1e-12, 1e-9
-# Points that are looked at at once, times sides.
+# The number of points treated together, times sides
 _BATCH = 1 << 20
-# Points of a picture's curve along a side.
+# The points of a picture's curve along a side
 _POINTS = 65
-# Up to this part of the distance of two sides a place is behind the nearer one.
+# Up to this part of the distance between two sides a place is behind the nearer one.
 _HALF = 0.4
 
 
 class Edges(NamedTuple):
-    """The sides of an outline, counter-clockwise, arcs of at most half a circle: arrays with an entry a side."""
+    """The sides of an outline, counter-clockwise, arcs of at most half a circle: arrays with an entry for a side."""
 
     start: Floats  # (n, 2)
     end: Floats
-    normal: Floats  # at the start
+    normal: Floats  # the normal at the start
     curvature: Floats  # (n,)
     ahead: Floats  # the tangents at the start and at the end, (n, 2)
     behind: Floats
     length: Floats  # (n,)
-    which: NDArray[np.int64]  # the side of the outline that it is of
+    which: NDArray[np.int64]  # the side of the outline that the entry is a part of
 
 
 def along(a: Floats, b: Floats) -> Floats:
@@ -80,7 +80,7 @@ class Outline:
         return float(self.sides.length.sum())
 
     def smallest(self) -> float:
-        """A length of the outline: twice its area over its perimeter, for a circle its radius [m]."""
+        """A length of the outline: twice its area over its perimeter [m], for a circle the radius."""
         return 2.0 * self.area() / self.perimeter()
 
     def corners(self) -> tuple[Floats, Floats]:
@@ -95,7 +95,7 @@ class Outline:
         return np.concatenate([self.sides.end, tops[np.isfinite(tops[:, 0])]])
 
     def _every_top(self) -> Floats:
-        """The leftmost, rightmost, lowest and highest points of arcs, (4, n, 2); its start where an arc has none."""
+        """The leftmost, rightmost, lowest and highest points of arcs, (4, n, 2); the start of an arc that has none."""
         s, found = self.sides, []
         bent = s.curvature != 0.0
         inverse = 1.0 / np.where(bent, s.curvature, 1.0)
@@ -116,19 +116,19 @@ class Outline:
         return np.where(np.abs(sine) > _SMOOTH, np.sign(sine), np.where(back, 1.0, 0.0)).astype(np.int64)
 
     def wedges(self, side: float) -> Floats:
-        """1 where sides join at a convex corner at their end, 0 smoothly, at a re-entrant one -sin of half its wedge.
+        """1 where sides join at a convex corner at their end, 0 if smoothly, -sin of half the re-entrant wedge.
 
-        As they are seen from within (side = 1) or from around (-1).
+        Convex and re-entrant are as seen from within (side = 1) or from around (-1).
         """
         after = np.roll(self.sides.ahead, -1, axis=0)
-        # The wedge is what the turn leaves of half a circle.
+        # The wedge is half a circle less the turn.
         cosine = np.clip(-along(self.sides.behind, after), -1.0, 1.0)
         turns = side * self.turns
         return np.asarray(np.where(turns < 0.0, -np.sqrt(0.5 * (1.0 - cosine)), turns))
 
     @cached_property
     def thickness(self) -> Floats:
-        """For every side, a distance within which the only other sides are those next to it [m]."""
+        """For each side, a distance within which the only other sides are its neighbours [m]."""
         s, n = self.sides, len(self)
         found, bent = np.full(n, self.extent), np.flatnonzero(s.curvature)
         points, owner = [s.start, s.end], [np.arange(n)] * 2
@@ -155,7 +155,7 @@ class Outline:
         return np.concatenate([d for d, _g in parts]), np.concatenate([g for _d, g in parts], axis=1)
 
     def _distances(self, points: Floats) -> Any:
-        """Of points (N, 2) from every side: signed of the whole curve, the unit vector along it, within, distance."""
+        """For points (N, 2) and sides: signed distance of the curve, unit vector along it, whether within, distance."""
         s, r = self.sides, points[:, None, :]
         off = r - s.start
         grad = s.normal + s.curvature[:, None] * off
@@ -174,7 +174,7 @@ class Outline:
         s, r = self.sides, points.T
         k = np.argmin(distance, axis=1)
         i = np.arange(len(k))
-        # At a corner both its sides are at one distance: there the corner says which side of it a point is on.
+        # At a corner both sides are at the same distance: the turn there decides on which side of it a point is.
         off, back = r - s.start[k], r - s.end[k]
         first = along(off, off) < along(back, back)
         turn = np.where(first, np.roll(self.turns, 1)[k], self.turns[k])
@@ -186,7 +186,7 @@ class Outline:
         return found, slope.T
 
     def curves(self) -> list[Floats]:
-        """A curve (k, 2) along every side, for pictures."""
+        """Return a curve (k, 2) along every side, for pictures."""
         return [self._curve(k) for k in range(len(self))]
 
     def _curve(self, k: int) -> Floats:
@@ -232,7 +232,7 @@ def _checked(name: str, rows: Any) -> tuple[Row, ...]:
 
 
 def _is_ring(rows: list[Row], nothing: float) -> bool:
-    """Whether the last vertex is the first one again, as GIS writes rings; no side begins there, so it has no bulge."""
+    """Whether the last vertex repeats the first one, as GIS writes rings; no side begins there, so it has no bulge."""
     if len(rows) < 3:
         return False
     (x0, y0, _bulge), (x1, y1, bulge) = rows[0], rows[-1]
@@ -240,13 +240,13 @@ def _is_ring(rows: list[Row], nothing: float) -> bool:
 
 
 def _reversed(rows: tuple[Row, ...]) -> list[Row]:
-    """The same outline the other way round: the bulge of a side is then at its other vertex."""
+    """Return the same outline the other way round: the bulge of a side is then at its other vertex."""
     turned = rows[::-1]
     return [(x, y, -turned[(k + 1) % len(turned)][2]) for k, (x, y, _bulge) in enumerate(turned)]
 
 
 def _sides_of(rows: Floats) -> Edges:
-    """The sides; an arc of more than half a circle is two of them."""
+    """Return the sides; an arc of more than half a circle is two of them."""
     start, end, bulge = rows[:, :2], np.roll(rows[:, :2], -1, axis=0), rows[:, 2]
     pieces = []
     for k in range(len(rows)):
@@ -279,7 +279,7 @@ def _turned(vectors: Floats, cosine: Floats, sine: Floats) -> Floats:
 
 def _area(sides: Edges) -> float:
     (x0, y0), (x1, y1), k = sides.start.T, sides.end.T, sides.curvature
-    # Of an arc, what is between it and its chord: (angle - sin(angle))/(2 k^2)
+    # For an arc, the area between it and its chord: (angle - sin(angle))/(2 k^2)
     angle = k * sides.length
     bent = k != 0.0
     caps = np.where(bent, (angle - np.sin(angle)) / np.where(bent, 2.0 * k * k, 1.0), 0.0)
@@ -310,10 +310,10 @@ def _require_apart(name: str, sides: Edges, nothing: float) -> None:
 
 
 def _common(a: Edges, b: Edges) -> list[Floats]:
-    """The two points that each pair of lines or circles has in common, NaN for a pair that has no such points."""
+    """Return the two points that each pair of lines or circles has in common, or NaN."""
     with np.errstate(all="ignore"):
         ka, kb = a.curvature, b.curvature
-        # A line through both points: kb La - ka Lb has no square; of two lines it is one of them.
+        # A line through both points: kb La - ka Lb has no square; for two lines it is one of the lines.
         off = a.start - b.start
         straight = (ka == 0.0) & (kb == 0.0)
         # La(r) = na.(r - a) + ka/2 |r - a|^2, about the point a; Lb about it: (nb + kb off).d + Lb(a)
@@ -324,7 +324,7 @@ def _common(a: Edges, b: Edges) -> list[Floats]:
         size2 = along(normal, normal)
         foot = -(shift / size2)[:, None] * normal
         way = np.stack([-normal[:, 1], normal[:, 0]], axis=1) / np.sqrt(size2)[:, None]
-        # Along that line the level of the one that is bent, or of the other line
+        # Along that line, the level of a curved side, or of the second line
         use_b = (kb != 0.0) | straight
         n, k, c = np.where(use_b[:, None], nb, a.normal), np.where(use_b, kb, ka), np.where(use_b, cb, 0.0)
         level = c + along(n, foot) + 0.5 * k * along(foot, foot)

@@ -1,4 +1,4 @@
-"""Walls that stand on an outline, as users describe them: what all such surfaces have in common."""
+"""Walls that stand on an outline, as users describe them: the common part of all such surfaces."""
 
 import math
 from collections.abc import Callable
@@ -27,13 +27,13 @@ from .outline import Outline
 from .round_side import round_side
 from .sides import FewSides, Side, Sides
 
-# At so few sides each lane looks on a straight flight; under gravity so few are in one cell of a grid.
+# Up to this number of sides each lane looks at all on a straight flight; up to the second number all are in one cell.
 _FEW, _IN_ONE_CELL = 24, 8
 # Entries of a matrix up to this size count as 0.
 _ALIGNED = 1e-15
-# Parts of the height of triangles on it, and points of a line along it.
+# The parts of the height of the triangles on it, and the points of a line along it
 _HIGH, _FINE = 8, 201
-# The axes x, y, z of the scene along which the plane's axes to the right, upwards and the axis across it are.
+# The axes x, y, z of the scene, of the plane's axes to the right and upwards and of the axis across it
 _ALONG = {(1.0, 0.0, 0.0): (1, 2, 0), (0.0, 1.0, 0.0): (2, 0, 1), (0.0, 0.0, 1.0): (0, 1, 2)}
 
 
@@ -48,11 +48,11 @@ class Outlined(Many):
     side: str
     height: Any = None
     face_noun: ClassVar[str] = "side"
-    # The argument that gives the outline.
+    # The argument that gives the outline
     given: ClassVar[str] = "outline"
 
     def rows(self) -> Any:
-        """The rows of the vertices."""
+        """Return the rows of the vertices."""
         return getattr(self, self.given)
 
     @cached_property
@@ -79,29 +79,29 @@ class Outlined(Many):
         across = _ALONG.get(self.axis)
         own = rotations.matrix(rotations.onto(self.axis)) if across is None else np.eye(3)[:, list(across)]
         found = own if self.rotation is None else rotations.matrix(self.rotation) @ own
-        # Round-off of a turn about its axis is no tilt.
+        # Round-off of a rotation about its axis is no tilt.
         found[np.abs(found) <= _ALIGNED] = 0.0
         return np.asarray(found)
 
     @property
     def across(self) -> int | None:
-        """The axis of the scene across its plane, or None if the plane is across no axis of the scene."""
+        """The axis of the scene that is perpendicular to its plane, or None."""
         column = self.frame[:, 2]
         return int(np.argmax(np.abs(column))) if np.count_nonzero(column) == 1 else None
 
     def in_plane(self, points: Floats) -> Floats:
-        """Points of the scene (3, N) in the outline's plane and across it: (3, N)."""
+        """Return points of the scene (3, N) in the outline's plane and across it: (3, N)."""
         return np.asarray(self.frame.T @ (points - np.array(self.center)[:, None]))
 
     def placed(self, points: Floats) -> Floats:
-        """Points of the plane (2, N) in the scene (3, N)."""
+        """Return points of the plane (2, N) in the scene (3, N)."""
         return np.asarray(self.frame[:, :2] @ points + np.array(self.center)[:, None])
 
     def plane_curves(self, across: int) -> list[Floats]:
         return self.curves()
 
     def curves(self) -> list[Floats]:
-        """A curve (k, 3) along every side, for pictures."""
+        """Return a curve (k, 3) along every side, for pictures."""
         return [self.placed(curve.T).T for curve in self.boundary.curves()]
 
     # --- For users ---
@@ -179,7 +179,7 @@ class Outlined(Many):
         return self.area() if across == self.across and abs(self.center[across]) < half else None
 
     def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
-        """Its sides and, of a prism, its lids."""
+        """Return the samples of its sides and, for a prism, of its lids."""
         frame = self.frame
         corners = np.array([[bounds[i >> k & 1][k] for k in range(3)] for i in range(8)]).T
         heights = frame[:, 2] @ corners
@@ -213,7 +213,7 @@ class Outlined(Many):
         return self.frame, {"axis": (0.0, 0.0, 1.0)}
 
     def level_sets(self) -> list[LevelSet]:
-        """The sides, and the lids as planes."""
+        """Return the level sets of the sides, and of the lids as planes."""
 
         def phi(points: Floats) -> Floats:
             return self.boundary.nearest(self.in_plane(points.T)[:2])[0]
@@ -262,9 +262,9 @@ class Outlined(Many):
         return field_of(sides[0], table, self._boxes, None, largest)
 
     def faces_of_balls(self, largest: float) -> tuple[Members, NDArray[np.int64]]:
-        """As of `ManyBodies`: runs of sides that join smoothly or at an edge towards the balls, and lids."""
+        """Return, as for `ManyBodies`, runs of sides that join smoothly or at an edge towards the balls, and lids."""
         n, sign = len(self.boundary), side_sign(self.side)
-        # A ball that is too wide for an arc touches what is next to it on both sides.
+        # A ball that is too wide for an arc touches the neighbours of the arc on both sides.
         fits = 1.0 - sign * self.boundary.sides.curvature * largest > 0.0
         splits = (self.boundary.wedges(sign) > 0.0) | ~fits | ~np.roll(fits, -1)
         face = np.concatenate([[0], np.cumsum(splits[:-1])])
@@ -277,7 +277,7 @@ class Outlined(Many):
         return np.asarray(side_sign(self.side) * self.phi(points, time) + radius)
 
     def lost(self, points: Floats, time: float) -> NDArray[np.bool_]:
-        # Those that have come out of its box: phi takes some microseconds for each.
+        # Particles outside of its box: phi takes some microseconds for each.
         rows, (low, high) = np.array(self._own_rows(points, time)), np.array(self.bounds())[:, :, None]
         return np.asarray(((rows < low) | (rows > high)).any(axis=0))
 
@@ -285,12 +285,12 @@ class Outlined(Many):
         return None
 
     def _boxes(self) -> tuple[Floats, Floats]:
-        """The lowest and the highest corners (3, n) of boxes around all walls, infinite across an endless outline."""
+        """The lowest and highest corners (3, n) of boxes around all walls, infinite across an endless outline."""
         low, high = self.boundary.corners()
         half = math.inf if self.height is None else 0.5 * self.height
         low, high = np.vstack([low, np.full(low.shape[1], -half)]), np.vstack([high, np.full(low.shape[1], half)])
         if self.height is not None:
-            # In the order of the walls: with the box of the other one a lid is in no cell
+            # In the order of the walls: a lid with the box of the second lid would be in no cell
             lids = np.array([[half, -half]])
             first, last = low[:2].min(axis=1), high[:2].max(axis=1)
             low = np.hstack([low, np.vstack([np.tile(first[:, None], 2), lids])])
@@ -303,7 +303,7 @@ class Outlined(Many):
         return np.ascontiguousarray(placed.min(axis=0) - room), np.ascontiguousarray(placed.max(axis=0) + room)
 
     def _side(self, k: int) -> Any:
-        """The numbers of wall k."""
+        """Return the numbers of wall k."""
         s, sign, n = self.boundary.sides, side_sign(self.side), len(self.boundary)
         slack = ON_OUTLINE * (self.extent() + self.boundary.extent)
         if k >= n:
@@ -325,7 +325,7 @@ class Outlined(Many):
         return Rotated(side, *(_vec(row) for row in frame)) if own else side
 
     def _lid(self, sign: float, slack: float) -> Any:
-        """The numbers of a lid, which has no ends: sides keep particles from beyond them."""
+        """Return the numbers of a lid, which has no ends: sides keep particles from beyond them."""
         across, frame, none = self.across, self.frame, Vec(0.0, 0.0, 0.0)
         own = across is None
         normal = np.array([0.0, 0.0, sign]) if own else sign * frame[:, 2]
@@ -344,14 +344,14 @@ def _on_lid(least: Floats, most: Floats, placed: Placed, height: float) -> Draw:
 
 
 def _side(begin: Floats, end: Floats) -> tuple[float, Callable[[Floats], Floats]]:
-    """The length of a side of an outline, a line or an arc, and its points at parts of it."""
+    """Return the length of a side of an outline, a line or an arc, and the function of its points at parts of it."""
     a, b, bulge = begin[:2], end[:2], float(begin[2])
     chord = float(np.hypot(*(b - a)))
     if bulge == 0.0:
         return chord, lambda part: a[:, None] + (b - a)[:, None] * part
     angle = 4.0 * math.atan(bulge)
     radius = chord / (2.0 * abs(math.sin(0.5 * angle)))
-    # To the left of the chord where the arc turns to the left by less than a half turn.
+    # To the left of the chord where the arc turns to the left by less than a half turn
     left = np.array([a[1] - b[1], b[0] - a[0]])
     center = 0.5 * (a + b) + left * (0.5 / math.tan(0.5 * angle))
     first = math.atan2(*(a - center)[::-1])

@@ -12,7 +12,7 @@ from .outlined import Outlined
 
 
 def _rows(name: str, value: Any) -> tuple[tuple[float, ...], ...]:
-    """`value` as the rows of an outline, without bulges that are 0."""
+    """Return `value` as the rows of an outline, without bulges that are 0."""
     return tuple(row if row[2] else row[:2] for row in Outline(name, value).rows)
 
 
@@ -27,10 +27,10 @@ class Polygon(Outlined):
         vertices: rows (x, y) or (x, y, bulge) [m], at least three, or two and an arc. As in DXF the bulge of the side
             that begins at a vertex is tan(angle/4) of its arc: 0 a line, 1 a half circle; above 0 it turns to the left,
             and so bulges outwards where the vertices go round counter-clockwise. A ring with its first vertex
-            once more at its end, as shapely has it, is the same outline.
+            repeated at its end, as shapely writes it, is the same outline.
         axis: across the outline; three numbers, not all 0. Seen from its tip x and y of the vertices are to the right
             and upwards: along x and y of the scene for z, along y and z for x, along z and x for y.
-        center: where the origin of the vertices is, three numbers [m].
+        center: the origin of the vertices, three numbers [m].
         side: "inside" or "outside", the admissible part.
 
     Raises:
@@ -56,7 +56,7 @@ class Stadium(Outlined):
     Args:
         radius: of the half circles, above 0 [m].
         length: of each line, along x of the outline's plane, 0 or more [m].
-        axis: across the outline, as of `Polygon`.
+        axis: across the outline, as for `Polygon`.
         center: three numbers [m].
         side: "inside" or "outside", the admissible part.
 
@@ -88,7 +88,7 @@ class Prism(Outlined):
     Args:
         outline: rows (x, y) or (x, y, bulge) [m], as the vertices of `Polygon`.
         height: the distance between the lids, half on each side of the centre, above 0 [m].
-        axis: across the outline, as of `Polygon`.
+        axis: across the outline, as for `Polygon`.
         center: three numbers [m].
         side: "inside".
 

@@ -1,4 +1,4 @@
-"""The sides of an outline as balls meet them: each parallel to its line or arc, and a circle around both its ends."""
+"""The sides of an outline as balls meet them: each is parallel to its line or arc, with a circle around each end."""
 
 import math
 from typing import Any
@@ -12,12 +12,12 @@ from ..time_of_impact.course import ball_rise_time
 from ..time_of_impact.rising import LevelStep
 from .sides import Side
 
-# What an arc bends away from within this part of its radius is a point.
+# An arc that shrinks to less than this part of its radius is a point.
 _LEAST = 1e-12
 
 
 class RoundSide(AtRadius):
-    """All that is within the radius of a ball from one side; phi is the distance outside of what is admissible."""
+    """All places within the radius of a ball from one side; phi is the distance outside of the admissible part."""
 
     wall: Side
     radius: float
@@ -30,7 +30,7 @@ class RoundSide(AtRadius):
         return self.wall.distance(r) + self.radius
 
     def gradient(self, r):
-        # Towards the nearest point of the side, or, behind it, away from that
+        # Towards the nearest point of the side or, behind it, away from that point
         wall = self.wall
         signed, out = wall.signed(r)
         d = wall.along_plane(r - wall.body.center)
@@ -46,12 +46,12 @@ class RoundSide(AtRadius):
         wall = self.wall
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         t, n = wall.ahead, wall.body.b
-        # Along the plane 1, across it 0, where boxes have no end
+        # 1 along the plane, 0 across it, where boxes have no end
         half = times(times(t, t) + times(n, n), half)
         return wall.beside(middle)[1] <= self.radius + 1.000001 * norm(half)
 
     def passed_by(self, r, move):
-        """How far a move that leads out through the side ends behind it [m], -1 where it does not."""
+        """Return how far a move that leads out through the side ends behind it [m], -1 if it does not."""
         time, _found = self.wall.first_hit(r, move)
         behind = self.wall.signed(r + move)[0]
         return select(time <= 1.0, select(behind > 0.0, behind, 0.0), -1.0)
@@ -59,7 +59,7 @@ class RoundSide(AtRadius):
     # --- Flight ---
 
     def parallel(self):
-        """Whether the ball is not too wide for the arc, and the line or arc so far in the admissible side."""
+        """(whether the ball is narrow enough for the arc, the line or arc at the radius in the admissible side)."""
         wall, radius = self.wall, self.radius
         body = wall.body
         # The curvature is 2 a, which is 0 across the plane.
@@ -78,14 +78,14 @@ class RoundSide(AtRadius):
         return square(self.wall.end) > 0.0
 
     def around(self, point):
-        """The circle around one of its ends."""
+        """Return the circle around one end."""
         t, n = self.wall.ahead, self.wall.body.b
         along = times(t, t) + times(n, n)
         across = Vec(_whole(along.x), _whole(along.y), _whole(along.z))
         return Tube(point, across, self.radius, self.radius * self.radius, -1.0)
 
     def ends(self):
-        """Both circles."""
+        """Return both circles."""
         start = self.wall.body.center
         return self.around(start), self.around(start + self.wall.end)
 
@@ -101,7 +101,7 @@ class RoundSide(AtRadius):
 
     @outlined
     def falling_hit(self, r, v, pull):
-        """When a fall hits the side: the parallel curve or a circle."""
+        """Return when a fall hits the side: the parallel curve or a circle."""
         fits, parallel = self.parallel()
         first, found = math.inf, True
         if fits:
@@ -118,7 +118,7 @@ class RoundSide(AtRadius):
 
     @outlined
     def moving_step(self, seen, longest):
-        """The `LevelStep` of the parallel curve and both circles."""
+        """Return the `LevelStep` of the parallel curve and both circles."""
         fits, parallel = self.parallel()
         found = LevelStep(0.0, 0.0, longest)
         if fits:
@@ -137,5 +137,5 @@ def _whole(part):
 
 
 def round_side(wall: Any) -> Any:
-    """A side of an outline, which may be turned, as balls meet it."""
+    """Return a side of an outline, which may be rotated, as balls meet it."""
     return wall._replace(body=round_side(wall.body)) if isinstance(wall, Rotated) else RoundSide(wall, 0.0)

@@ -1,4 +1,4 @@
-"""The walls that stand on an outline as kernels take them: planes and round walls, each as far as its side goes."""
+"""The numbers of walls that stand on an outline: planes and round walls, each as long as its side."""
 
 import math
 
@@ -14,31 +14,31 @@ from ..shapes.quadratic import QuadricNumbers, form
 from ..time_of_impact.course import Fall, Quartic, close, rise_time, under_way
 from ..time_of_impact.rising import patch_step
 
-# How often a fall may cross the whole of a round wall, and how often it may need more steps between.
+# The most crossings of the whole round wall by a fall, and the most times that it may need more steps between them.
 _CROSSINGS = 12
 
 
 class Side(Unturned):
-    """One side: a quadric of curvature k that goes through its start, where that is within the side.
+    """One side: the part of a quadric of curvature k through its start that is within the side.
 
     The level of the quadric, n.d + k/2 |d|^2 with d = r - start, is the distance to first order.
     """
 
-    body: QuadricNumbers  # center: the start, b: n there, out of what is admissible, a: k/2 along the plane
-    ahead: Vec  # the tangent at the start, from there to the end; 0 where the wall has no ends
-    behind: Vec  # and at the end
-    end: Vec  # from the start
-    slack: float  # round-off of a place [m]: a hit so far beyond an end is one still
+    body: QuadricNumbers  # center: the start, b: n there, out of the admissible part, a: k/2 along the plane
+    ahead: Vec  # the tangent at the start, towards the end; 0 where the wall has no ends
+    behind: Vec  # the tangent at the end
+    end: Vec  # the end, relative to the start
+    slack: float  # round-off of a place [m]: a hit this far beyond an end is still a hit
     extent: float  # of the outline [m]
-    before: float  # 1 where there is a convex corner at the start, 0 smooth, at a re-entrant one -sin of half its wedge
-    after: float  # and at the end
-    thickness: float  # of what is behind it, at the least [m]
+    before: float  # 1 for a convex corner at the start, 0 if smooth, -sin of half the wedge at a re-entrant one
+    after: float  # the same number at the end
+    thickness: float  # a lower bound of the thickness behind it [m]
     joined_before: float  # the number of the side that joins it smoothly at its start, or -1
-    joined_after: float  # and at its end
+    joined_after: float  # the number of the side that joins it smoothly at its end, or -1
 
     holds_balls = False
 
-    # The side is a part of the quadric, of which the level alone does not say when a fall hits it.
+    # The side is a part of the quadric; the quadric's level alone does not tell when a fall hits the side.
     is_quartic = may_be_far = in_steps = False
 
     def steps(self, gravity, r, v):
@@ -48,7 +48,7 @@ class Side(Unturned):
         return self.falling_hit(r, v, pull)[0]
 
     def is_within(self, d, room):
-        """Whether a point of the quadric, from the start of the side, is of the side, or nearer to it than that."""
+        """Whether a point of the quadric, relative to the start of the side, is on the side, or within `room` of it."""
         return (dot(d, self.ahead) >= -room) & (dot(d - self.end, self.behind) <= room)
 
     def first_hit(self, r, v):
@@ -56,7 +56,7 @@ class Side(Unturned):
         d = r - body.center
         c = form(body.a, d, d) + dot(body.b, d)
         b, a = form(body.a, d, v) + 0.5 * dot(body.b, v), form(body.a, v, v)
-        # Outside by round-off is on the wall.
+        # A place that is outside by round-off is on the wall.
         c = select((c > 0.0) & (c <= self.slack), 0.0, c)
         discriminant = b * b - a * c
         root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
@@ -69,7 +69,7 @@ class Side(Unturned):
 
     @outlined
     def falling_hit(self, r, v, pull):
-        """When a fall hits the side: the first time at which its level rises through 0 within the side."""
+        """Return when a fall hits the side: the first time at which its level rises through 0 within the side."""
         begin, end = _near(self, r, v, pull)
         if not begin <= end:
             return math.inf, True
@@ -106,7 +106,7 @@ class Side(Unturned):
         return t, False
 
     def level_of_fall(self, r, v, pull):
-        """The level of the quadric along a fall."""
+        """Return the level of the quadric along a fall."""
         body = self.body
         d = r - body.center
         c, b = form(body.a, d, d) + dot(body.b, d), form(body.a, d, v) + 0.5 * dot(body.b, v)
@@ -117,7 +117,7 @@ class Side(Unturned):
         return Quartic(c, b, a2, a3, a4, select((a3 == 0.0) & (a4 == 0.0), math.inf, window))
 
     def edges(self):
-        """The planes across its ends, admissible beyond it; none of a wall without ends."""
+        """Return the planes across its ends, admissible beyond the side; no place is beyond a wall without ends."""
         body, t, u = self.body, self.ahead, self.behind
         start, end = dot(t, body.center), dot(u, body.center + self.end)
         return PlaneNumbers(t, start - self.slack), PlaneNumbers(-1.0 * u, -end - self.slack)
@@ -132,7 +132,7 @@ class Side(Unturned):
     # --- The distance from the side ---
 
     def signed(self, r):
-        """The distance outside of the whole quadric, without cancellation, and the unit vector along it."""
+        """Return the distance outside of the whole quadric, without cancellation, and the unit vector along it."""
         body = self.body
         d = r - body.center
         gradient = body.gradient(r)
@@ -141,9 +141,9 @@ class Side(Unturned):
         return 2.0 * level / (1.0 + steep), gradient * (1.0 / select(steep > 0.0, steep, 1.0))
 
     def beside(self, r):
-        """(Signed distance outside, distance, whether the nearest point is not an end) of a point from the side.
+        """Return (signed distance outside, distance, whether the nearest point is not an end) of a point from the side.
 
-        At its ends corners say on which side of the outline the point is.
+        At its ends the corners decide on which side of the outline the point is.
         """
         signed, out = self.signed(r)
         d = self.along_plane(r - self.body.center)
@@ -155,7 +155,7 @@ class Side(Unturned):
         return select(within, signed, outside), select(within, abs(signed), beyond), within
 
     def out(self, r):
-        """The unit vector along which the first number of `beside` rises."""
+        """Return the unit vector along which the first number of `beside` rises."""
         signed, out = self.signed(r)
         d = self.along_plane(r - self.body.center)
         if self.is_within(d - signed * out, self.slack):
@@ -167,19 +167,19 @@ class Side(Unturned):
         return away * (sign / size) if size > 0.0 else out
 
     def along_plane(self, d):
-        """A vector without its part across the plane of the outline."""
+        """Return a vector without its part across the plane of the outline."""
         return dot(self.ahead, d) * self.ahead + dot(self.body.b, d) * self.body.b
 
     def may_reach(self, low, high):
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         t, n = self.ahead, self.body.b
-        # Along the plane 1, across it 0, where boxes have no end
+        # 1 along the plane, 0 across it, where boxes have no end
         half = times(times(t, t) + times(n, n), half)
         return self.beside(middle)[1] <= 1.000001 * norm(half)
 
     def distance(self, r):
-        # Beside the side a point is not outside, however far it is beyond the whole quadric; nor is it where the wedge,
-        # or what is behind the side, ends: there it is in front of another side.
+        # Beside the side a point is not outside, however far it is beyond the whole quadric; nor is it beyond the end
+        # of the wedge or of the thickness behind the side: there it is in front of another side.
         signed, away, within = self.beside(r)
         d = self.along_plane(r - self.body.center)
         first = select(self.before < 0.0, -self.before * norm(d), math.inf)
@@ -189,7 +189,7 @@ class Side(Unturned):
 
 
 class Sides(Members, Patched):
-    """The sides of an outline: a field with walls for bodies, as far as they go."""
+    """The sides of an outline: a field of walls for bodies, each as long as its side."""
 
     @outlined
     def is_in_another(self, number, r):
@@ -202,7 +202,7 @@ class Sides(Members, Patched):
 
     @outlined
     def foot(self, tree, r):
-        """Of a point beyond the outline and a lid the root of the sum of the squares of both distances."""
+        """The distance and the normal; of a point beyond outline and lid the root of the sum of both squares."""
         gap, which, lid, above = _nearest_each(self, r)
         if lid > 0.0 and gap > 0.0:
             both = math.sqrt(lid * lid + gap * gap)
@@ -210,13 +210,13 @@ class Sides(Members, Patched):
         return SignedDistance(max(gap, lid), _out_of(self, above if lid > gap else which, r))
 
     def is_there(self, number, r, near):
-        """Whether a side reaches to a place on its wall, or nearer to it than that."""
+        """Whether a side reaches to a place on its wall, or within `near` of it."""
         side = self.wall(number)
         r, side = _in_frame(side, r)
         return side.is_within(r - side.body.center, side.slack + near)
 
     def wall_after(self, number, r, near):
-        """The side on which what slides on this one goes on beyond its end at r, -1 where it has a corner there."""
+        """Return the side on which a slide continues beyond the end of this one at r, -1 if it has a corner there."""
         side = self.wall(number)
         r, side = _in_frame(side, r)
         d = side.along_plane(r - side.body.center)
@@ -227,14 +227,14 @@ class Sides(Members, Patched):
         return is_other or self.is_there(number, r, 0.0)
 
     def goes_on(self, number, other):
-        """Whether a side joins this one smoothly: what slides on this one does not meet it, but goes on on it."""
+        """Whether a side joins this one smoothly: a particle that slides here does not hit it, but moves on to it."""
         side = self.wall(number)
         side = side.body if isinstance(side, Rotated) else side
         return (side.joined_before == other) | (side.joined_after == other)
 
 
 class FewSides(Sides):
-    """So few sides that each lane looks at all of them on a straight flight."""
+    """Sides that are few enough for each lane to look at all of them on a straight flight."""
 
     few = True
 
@@ -243,10 +243,10 @@ class FewSides(Sides):
 
 
 def _near(side, r, v, pull):
-    """The first and the last time at which a fall may be near a side: in a square around it."""
+    """Return the first and the last time at which a fall may be near a side: in a square around it."""
     if square(side.end) == 0.0:
         return 0.0, math.inf  # a wall without ends
-    # Arcs are at most half circles: all is within the circle that has the chord as its diameter.
+    # Arcs are at most half circles: all of the side is within the circle that has the chord as its diameter.
     d, room = r - side.body.center - 0.5 * side.end, 0.500001 * norm(side.end) + side.slack
     t, n = side.ahead, side.body.b
     first, last = _within(dot(t, d), dot(t, v), dot(t, pull), room)
@@ -255,7 +255,7 @@ def _near(side, r, v, pull):
 
 
 def _within(x, u, g, room):
-    """The first and the last time at which x + u t + g t^2/2 is no farther than this from 0."""
+    """Return the first and the last time at which x + u t + g t^2/2 is within `room` of 0."""
     sign = math.copysign(1.0, x)
     first = select(abs(x) <= room, 0.0, rise_time(room - abs(x), -0.5 * sign * u, -0.5 * sign * g))
     ahead = select(g == 0.0, math.copysign(1.0, u), math.copysign(1.0, g))
@@ -265,7 +265,7 @@ def _within(x, u, g, room):
 
 @outlined
 def _nearest(sides, r):
-    """How far a point is outside of the outline or beyond a lid, and the number of that side or lid."""
+    """Return how far a point is outside of the outline or beyond a lid, and the number of that side or lid."""
     if sides.is_gone():
         return -math.inf, -1.0
     gap, which, lid, above = _nearest_each(sides, r)
@@ -273,9 +273,9 @@ def _nearest(sides, r):
 
 
 def _nearest_each(sides, r):
-    """How far a point is outside of the outline, and the number of that side; how far beyond a lid, and that number."""
+    """Return the distance of a point outside of the outline, the number of that side, and the same beyond a lid."""
     least, gap, which, lid, above = math.inf, -math.inf, 0.0, -math.inf, 0.0
-    # All of them: that of the cell that is nearest may be the back of a thin wall.
+    # All sides: the nearest one in the cell may be the back of a thin wall.
     for m in range(sides.table.shape[0]):
         side = member(sides, index(m))
         own, body = _in_frame(side, r)
@@ -283,19 +283,19 @@ def _nearest_each(sides, r):
         if square(body.end) == 0.0:
             if signed > lid:
                 lid, above = signed, float(m)
-        # At a corner both its sides are at one distance, and it says the same of both.
+        # At a corner both sides are at the same distance, and the corner gives the same sign for both.
         elif away < least:
             least, gap, which = away, signed, float(m)
     return gap, which, lid, above
 
 
 def _in_frame(side, r):
-    """A point in the frame of a side, and the side there, which may be turned in the scene."""
+    """Return a point in the frame of a side, and the side there, which may be rotated in the scene."""
     return (side.place_in(r), side.body) if isinstance(side, Rotated) else (r, side)
 
 
 def _out_of(sides, number, r):
-    """`out` of the side with this number."""
+    """Return `out` of the side with this number."""
     side = member(sides, index(int(number)))
     own, body = _in_frame(side, r)
     return side.vector_out(body.out(own)) if isinstance(side, Rotated) else body.out(own)
