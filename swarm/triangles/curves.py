@@ -1,4 +1,4 @@
-"""Curves on triangles: where numbers at their corners are 0, as at a height, and where two meet at an angle."""
+"""Curves on triangles: where numbers at the corners are 0, as at a height, and where two triangles form an angle."""
 
 import math
 from typing import NamedTuple
@@ -14,12 +14,12 @@ _EDGE = math.radians(30.0)
 
 
 def levels(points: Floats, triangles: Indices, heights: Floats) -> list[Floats]:
-    """The curves in which horizontal planes at some heights [m] cut triangles."""
+    """Return the curves in which horizontal planes at some heights [m] cut triangles."""
     return [curve for height in heights for curve in zeros(points, triangles, points[:, 2] - height)]
 
 
 def zeros(points: Floats, triangles: Indices, above: Floats) -> list[Floats]:
-    """The curves at which a function of points is 0."""
+    """Return the curves at which a function of points is 0."""
     is_above = above > 0.0
     mixed = triangles[is_above[triangles].any(axis=1) & ~is_above[triangles].all(axis=1)]
     if not len(mixed):
@@ -34,7 +34,7 @@ def zeros(points: Floats, triangles: Indices, above: Floats) -> list[Floats]:
 
 
 class _Sides(NamedTuple):
-    """The sides of triangles: the two points of each, and of those of two triangles these, and their angle."""
+    """The sides of triangles: the two points of each; for sides of two triangles, these triangles and their angle."""
 
     ends: Indices
     is_pair: NDArray[np.bool_]
@@ -56,7 +56,7 @@ def _sides(points: Floats, triangles: Indices) -> _Sides:
 
 
 def creases(points: Floats, triangles: Indices) -> Indices:
-    """The sides (E, 2) of triangles that are on a rim, or at which two of them meet at an angle."""
+    """Return the sides (E, 2) of triangles that are on a rim, or at which two triangles meet at an angle."""
     found = _sides(points, triangles)
     shown = ~found.is_pair
     shown[found.is_pair] = found.cosine < math.cos(_EDGE)
@@ -64,21 +64,21 @@ def creases(points: Floats, triangles: Indices) -> Indices:
 
 
 def neighbours(points: Floats, triangles: Indices) -> tuple[Indices, Indices]:
-    """The pairs of triangles that meet at a side, but for an angle."""
+    """Return the pairs of triangles that meet at a side smoothly."""
     found = _sides(points, triangles)
     smooth = found.cosine >= math.cos(_EDGE)
     return found.mine[smooth], found.other[smooth]
 
 
 def joined(points: Floats, pairs: Indices) -> list[Floats]:
-    """Curves through points that are joined in pairs, each as long as it does not branch."""
+    """Return curves through points that are joined in pairs, each as long as it does not branch."""
     ways: dict[int, list[int]] = {}
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     for k, (a, b) in enumerate(pairs.tolist()):
         ways.setdefault(a, []).append(k)
         ways.setdefault(b, []).append(k)
     ends, left, curves = pairs.tolist(), [True] * len(pairs), []
-    # Closed curves have no end: they begin where one of the pairs does.
+    # Closed curves have no end: they begin where one of their pairs begins.
     begins = [point for point, of in ways.items() if len(of) != 2]
     for point in (*begins, *pairs[:, 0].tolist()):
         for start in ways[point]:
@@ -98,17 +98,17 @@ def joined(points: Floats, pairs: Indices) -> list[Floats]:
 
 
 def runs(curve: Floats, kept: NDArray[np.bool_]) -> list[Floats]:
-    """The parts of a curve with points that are kept, two points or more each."""
+    """Return the parts of a curve with points that are kept, two points or more each."""
     return [curve[a:b] for a, b in spans(kept) if b - a > 1]
 
 
 def spans(kept: NDArray[np.bool_]) -> Indices:
-    """The runs of points that are kept: of each its first point, and the first one after it (n, 2)."""
+    """Return the runs of points that are kept: for each its first point, and the first point after it (n, 2)."""
     return np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8))).reshape(-1, 2)
 
 
 def finer(curve: Floats, step: float) -> Floats:
-    """A curve with points so near to each other [m]."""
+    """Return a curve with points at most `step` apart [m]."""
     pieces = np.sqrt((np.diff(curve, axis=0) ** 2).sum(axis=1))
     many = np.maximum(1, np.ceil(pieces / step).astype(np.int64))
     place = np.concatenate([k + np.arange(n) / n for k, n in enumerate(many.tolist())] + [[float(len(pieces))]])
@@ -116,6 +116,6 @@ def finer(curve: Floats, step: float) -> Floats:
 
 
 def turning(points: Floats, triangles: Indices, faces: NDArray[np.bool_]) -> Indices:
-    """The sides (E, 2) between a triangle that faces and one that does not."""
+    """Return the sides (E, 2) between a triangle that faces and one that does not."""
     found = _sides(points, triangles)
     return np.asarray(found.ends[found.is_pair][faces[found.mine] != faces[found.other]])

@@ -1,6 +1,6 @@
-"""Triangles on smooth surfaces, cut where these are no wall: finer where the cut is curved, so that edges are sharp.
+"""Triangles on smooth surfaces, cut to the parts that are a wall: finer where the cut is curved, for sharp edges.
 
-Points are (V, 3) [m], triangles (T, 3). A *level* is a function of points (N, 3) to (N,), below 0 where something is.
+Points are (V, 3) [m], triangles (T, 3). A *level* is a function of points (N, 3) to (N,), below 0 in the kept part.
 """
 
 from collections.abc import Callable
@@ -14,23 +14,23 @@ from ..surfaces.rotation import normalized
 
 Level = Callable[[Floats], Floats]
 
-# Triangles near a cut are halved until it is this straight, as a part of their width, or there are so many of them.
+# Triangles near a cut are halved until it is this straight, as a part of their width, or there are this many of them.
 _STRAIGHT, _MOST, _ROUNDS = 0.01, 1500, 6
-# For each of many bodies that cut a surface, so many more; for at most so many bodies.
+# For each of many bodies that cut a surface this many more; for at most this many bodies.
 _EACH, MOST_BODIES = 100, 200
 # Bisections of an edge at a cut, and steps onto a surface.
 _BISECTIONS, _STEPS = 8, 3
-# Normals this parallel are those of a plane.
+# Normals this parallel belong to a plane.
 _FLAT = 1e-9
-# Points along each side of the grid on which a surface is found, and where it is flat; cells beyond it.
+# Points along each side of the grid on which a surface is found, fewer where it is flat; cells beyond the surface
 _POINTS, _FEW, _MARGIN = 40, 8, 2.0
 
 
 class Cut(NamedTuple):
-    """What is left of triangles, and the edges that the cut has made, pairs of points (R, 2).
+    """The rest of triangles after a cut, and the edges that the cut has made, pairs of points (R, 2).
 
     Attributes:
-        origins: for each triangle the number of the one that it is a part of (T,).
+        origins: for each triangle the number of the original triangle (T,).
     """
 
     points: Floats
@@ -55,7 +55,7 @@ class SmoothSurface(NamedTuple):
         return np.asarray(self.phi(points) / np.maximum(np.sqrt((self.gradient(points) ** 2).sum(axis=1)), 1e-300))
 
     def onto(self, points: Floats, farthest: float) -> Floats:
-        """The points moved onto the surface, each step at most so far [m]."""
+        """Return the points moved onto the surface, each step at most `farthest` long [m]."""
         for _ in range(_STEPS):
             with np.errstate(all="ignore"):
                 slope = self.gradient(points)
@@ -69,9 +69,9 @@ class SmoothSurface(NamedTuple):
 def found_in(
     surface: SmoothSurface, low: Floats, high: Floats, frame: Floats, is_cut: bool = False
 ) -> tuple[Floats, Indices]:
-    """The triangles of a surface in a box that is given in a frame, the columns of a matrix.
+    """Return the triangles of a surface in a box that is given in a frame, the columns of a matrix.
 
-    Those of a plane are few, but where many bodies cut it: these are smaller.
+    A plane has few triangles, except where many bodies cut it: these are smaller.
     """
     points, triangles = _on_grid(surface, low, high, frame, _POINTS)
     if len(points) and not is_cut:
@@ -88,7 +88,7 @@ def _on_grid(surface: SmoothSurface, low: Floats, high: Floats, frame: Floats, c
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3) @ frame.T
     with np.errstate(all="ignore"):
         values = surface.phi(grid)
-    # No particle is where phi is no number.
+    # No particle is at a place where phi is NaN.
     values = np.where(np.isfinite(values), values, np.max(values, where=np.isfinite(values), initial=1.0))
     if not values.min() < 0.0 < values.max():
         return np.empty((0, 3)), np.empty((0, 3), np.int64)
@@ -98,9 +98,9 @@ def _on_grid(surface: SmoothSurface, low: Floats, high: Floats, frame: Floats, c
 
 
 def cut(surface: SmoothSurface, points: Floats, triangles: Indices, level: Level, bodies: int = 0) -> Cut:
-    """The part of triangles on a surface at which a level, a distance to first order, is not above 0.
+    """Return the part of triangles on a surface where a level, a distance to first order, is not above 0.
 
-    For each of so many `bodies` that cut it there may be more triangles, so that its hole is as round as one alone.
+    For each of the `bodies` that cut it there may be more triangles, so that its hole is as round as that of one body.
     """
     if not len(triangles):
         return Cut(points, triangles, np.empty((0, 2), np.int64), np.empty(0, np.int64))
@@ -108,7 +108,7 @@ def cut(surface: SmoothSurface, points: Floats, triangles: Indices, level: Level
     points, triangles, values, origins = _finer(surface, points, triangles, values, level, _MOST + _EACH * bodies)
     kept = values <= 0.0
     inside = kept[triangles].sum(axis=1)
-    # So that the corner that differs from both others comes first
+    # So that the corner that differs from the others comes first
     is_mixed = (inside == 1) | (inside == 2)
     mixed, of_mixed = triangles[is_mixed], origins[is_mixed]
     alone = (kept[mixed] == (inside[is_mixed] == 1)[:, None]).argmax(axis=1)
@@ -134,7 +134,7 @@ def cut(surface: SmoothSurface, points: Floats, triangles: Indices, level: Level
 
 
 def _widths(points: Floats, triangles: Indices) -> Floats:
-    """The longest side of each triangle."""
+    """Return the longest side of each triangle."""
     corners = points[triangles]
     return np.asarray(np.sqrt(((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=2)).max(axis=1))
 
@@ -142,10 +142,10 @@ def _widths(points: Floats, triangles: Indices) -> Floats:
 def _finer(
     surface: SmoothSurface, points: Floats, triangles: Indices, values: Floats, level: Level, most: int
 ) -> tuple[Floats, Indices, Floats, Indices]:
-    """Triangles at the cut in four, as long as it bends within them.
+    """Divide triangles at the cut in four, as long as it bends within them.
 
     Returns:
-        Points, triangles, the levels of points, and the number of the triangle that each is a part of.
+        Points, triangles, the levels of points, and for each triangle the number of the original one.
     """
     origins = np.arange(len(triangles))
     for _ in range(_ROUNDS):
@@ -174,7 +174,7 @@ def _finer(
 
 
 def _crossings(surface: SmoothSurface, points: Floats, edges: Indices, values: Floats, level: Level) -> Floats:
-    """The points on edges of triangles at which a level is 0."""
+    """Return the points on edges of triangles at which a level is 0."""
     if not len(edges):
         return np.empty((0, 3))
     within = values[edges[:, 0]] <= 0.0

@@ -13,13 +13,13 @@ from ..surfaces import Spheres
 from ..surfaces.surface import Surface
 from .cut import SmoothSurface, cut
 
-# The box in which a scene is drawn is so many of its parts wider than the walls, two on each side.
+# The parts of the box in which a scene is drawn; it is two of them wider than the walls on each side.
 _POINTS = 48
-# Of each of many balls, the points along each side of its grid; of bodies of another kind, how many are drawn.
+# For each of many balls the points along each side of its grid; for other bodies the number that is drawn
 _COARSE, _MOST_BODIES = 10, 2_000
-# Of each of many bodies of another kind, the points along each side of its grid.
+# For each of many other bodies, the points along each side of its grid
 _BODY = 16
-# Of balls that are cavities, so many more; and what is no depth in another one, as a part of the size of all.
+# The points on the grids of all balls that are cavities; a depth in another ball that counts as 0, relative to all
 _FOAM, _ROUND_OFF = 100_000, 1e-9
 # Cells of the grid beyond the walls, so that these are closed.
 _MARGIN = 2.0
@@ -33,13 +33,13 @@ NOTHING: Triangles = np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty((0, 
 
 
 def placed(pose: Pose, mesh: Triangles) -> Triangles:
-    """A mesh where its surface is now."""
+    """Return a mesh at the present place of its surface."""
     vertices, triangles, normals = mesh
     return pose.placed(vertices.T).T, triangles, pose.turned(normals.T).T
 
 
 def given_box(box: Corners, pose: Pose) -> Corners:
-    """A box around a box of the scene in the frame in which a surface is given."""
+    """Return a box around a box of the scene, in the frame in which a surface is given."""
     corners = pose.given(np.array(list(itertools.product(*zip(*box, strict=True)))).T)
     return corners.min(axis=1), corners.max(axis=1)
 
@@ -49,7 +49,7 @@ def _axes(box: Corners, count: int) -> list[Floats]:
 
 
 def _mesh(values: Floats, box: Corners) -> Triangles:
-    """The level 0 of values at the points of a grid in the box."""
+    """Return the level 0 of values at the points of a grid in the box."""
     if not values.min() < 0.0 < values.max():
         return NOTHING
     low, high = box
@@ -59,15 +59,15 @@ def _mesh(values: Floats, box: Corners) -> Triangles:
 
 
 def foam(spheres: Spheres) -> tuple[Triangles, NDArray[np.int64]]:
-    """Many balls that are cavities, where these are in no other one."""
+    """Return the triangles of many balls that are cavities, where they are in no other ball."""
     (vertices, triangles, _normals), numbers = balls(spheres, max(_COARSE, int((_FOAM / len(spheres)) ** 0.5)))
     size = float(np.ptp(vertices, axis=0).max())
 
     def level(points: Floats) -> Floats:
-        """How deep a point of a ball is in another one, to first order."""
+        """Return how deep a point of a ball is in another ball, to first order."""
         return np.asarray(-spheres.phi(points.T) - _ROUND_OFF * size)
 
-    # Points on a ball stay on it: between two of them no others are made that matter.
+    # Points on a ball stay on it: between two of them no other points that matter are made.
     wall = SmoothSurface(lambda points: np.zeros(len(points)), lambda points: spheres.gradient(points.T).T)
     points, triangles, _rims, origins = cut(wall, vertices, triangles, level)
     # Where balls of coarse triangles meet, edges would be zigzags.
@@ -75,7 +75,7 @@ def foam(spheres: Spheres) -> tuple[Triangles, NDArray[np.int64]]:
 
 
 def balls(spheres: Spheres, count: int = _COARSE) -> tuple[Triangles, NDArray[np.int64]]:
-    """Many balls: coarse, so that thousands can be drawn; and the number of the ball of each triangle."""
+    """Return many balls, coarse, so that thousands can be drawn, and the number of the ball of each triangle."""
     box = np.full(3, -1.3), np.full(3, 1.3)
     grid = np.array(np.meshgrid(*_axes(box, count), indexing="ij"))
     unit, triangles, _normals = _mesh(np.sqrt((grid**2).sum(axis=0)) - 1.0, box)
@@ -88,7 +88,7 @@ def balls(spheres: Spheres, count: int = _COARSE) -> tuple[Triangles, NDArray[np
 
 
 def each_body(surface: Surface, box: Corners) -> tuple[Triangles, NDArray[np.int64]]:
-    """Bodies of another kind, each on a grid of its own; and the number of the body of each triangle."""
+    """Return bodies of other kinds, each on a grid of its own, and the number of the body of each triangle."""
     solids = surface.solids()
     meshes, numbers = [NOTHING], [np.empty(0, np.int64)]
     first = 0
@@ -109,14 +109,14 @@ def each_body(surface: Surface, box: Corners) -> tuple[Triangles, NDArray[np.int
 
 
 def around(points: Floats, box: Corners, count: int = _POINTS) -> Corners:
-    """The box of some points, larger by a few cells of a grid of so many points along each side, in the box of all."""
+    """Return the box of some points, larger by a few cells of a grid with `count` points a side, within `box`."""
     low, high = points.min(axis=0), points.max(axis=0)
     margin = 2.0 * _MARGIN * np.maximum(high - low, 0.1 * (high - low).max()) / (count - 1.0)
     return np.maximum(low - margin, box[0]), np.minimum(high + margin, box[1])
 
 
 def box_around(scene: Scene, positions: Floats, time: float) -> Corners:
-    """The box in which the walls of a scene are drawn at a time [s], around them and particles (3, N)."""
+    """Return the box in which the walls of a scene are drawn at a time [s], around them and particles (3, N)."""
     low, high = (np.array(corner) for corner in scene.bounds(time))
     reach = _BEYOND * max(scene.extent(), float(np.abs(positions).max()))
     low, high = np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)

@@ -1,4 +1,4 @@
-"""The parts of the surfaces of a scene, each a wall where no other one takes that away: of unions and the like."""
+"""The parts of the surfaces of a scene, each a wall where no other part takes it away: of unions and the like."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -15,22 +15,22 @@ from ..surfaces.surface import Surface
 from ..surfaces.union import Place
 
 # Parts of the size of the drawing: a distance that counts as 0, and the distance from a wall at which a level is
-# evaluated to choose between two walls in one place.
+# evaluated to choose between two walls at one place.
 _NOTHING, _BESIDE = 1e-8, 2e-8
-# No distance is more than this many times that size.
+# No distance is more than this many times the size of the drawing.
 _FAR = 1e3
 
 
 @dataclass(frozen=True)
 class Cover:
-    """A surface that says where a wall is: in its admissible side (`sign` +1), or outside of that (-1).
+    """A surface that tells where a wall is: in its admissible side (`sign` +1), or outside of its admissible side (-1).
 
     Attributes:
-        time: [s].
-        is_room: whether it is a part beside the wall's in a union.
-        first: whether it has what lies in both, so that two walls in one place are drawn once.
-        opens: whether it has a face in common with the wall's part, which is no wall.
-        turn: +1 or -1, whether a way out of the wall is one of what the surface is to cover.
+        time: the time [s].
+        is_room: whether it is a part beside the part of the wall in a union.
+        first: whether it keeps a wall that lies in both, so that two walls in one place are drawn once.
+        opens: whether it shares a face with the part of the wall, which is no wall.
+        turn: +1 or -1, whether a way out of the wall is a way out of the volume that the surface is to cover.
         side: +1 or -1, the sign of phi that is its gap.
     """
 
@@ -44,15 +44,15 @@ class Cover:
     turn: float = 1.0
 
     def level(self, points: Floats, outwards: Floats, size: float) -> Floats:
-        """The level at points (N, 3) of a wall with unit normals (N, 3).
+        """Return the level at points (N, 3) of a wall with unit normals (N, 3).
 
         It is above 0 where this surface takes the wall away, and a distance to first order.
         """
         if not self.surface.is_there(self.time):
-            # All points are on its admissible side.
+            # All points are on its admissible side
             return np.full(len(points), -self.sign * size)
         way = self.turn * _BESIDE * size * outwards
-        # Of several walls in one place one is drawn. A wall between two rooms without a common volume is not drawn.
+        # One of several walls at one place is drawn. A wall between two rooms without a common volume is not drawn.
         if self.sign < 0.0:
             here = self._level(points - way if self.first else points, size)
             return np.maximum(here, self._level(points + way, size)) if self.opens else here
@@ -60,7 +60,7 @@ class Cover:
         return np.maximum(before, self._level(points + way, size)) if self.first else before
 
     def level_behind(self, points: Floats, outwards: Floats, size: float) -> Floats:
-        """The same a little behind a wall."""
+        """Return the level slightly behind a wall."""
         return self._level(points + self.turn * _BESIDE * size * outwards, size)
 
     def _level(self, points: Floats, size: float) -> Floats:
@@ -71,7 +71,7 @@ class Cover:
         return np.asarray(self.sign * gap - _NOTHING * size)
 
     def may_cover(self, low: Floats, high: Floats) -> bool:
-        """Whether it may take away something of a wall in a box."""
+        """Whether it may take away a part of a wall in a box."""
         if self.sign > 0.0 or self.side < 0.0 or not self.surface.is_there(self.time):
             return True
         first, last = (np.array(corner) for corner in box_of(self.surface, self.time))
@@ -80,14 +80,14 @@ class Cover:
 
 @dataclass(frozen=True)
 class Part:
-    """A surface that is a part of one of the scene, or one of these itself.
+    """A surface of the scene, or a part of one.
 
     Attributes:
         owner: the number of the surface in the scene.
-        place: its place in that surface: the number of the part, and of the part of the part; empty for the whole.
-        surface: with what is given to the whole.
+        place: the number of the part in that surface, then of the part of the part; empty for the whole surface.
+        surface: the part, with the arguments that the whole surface was given.
         solid: whether particles are kept out of it.
-        covers: what leaves of it a wall.
+        covers: the surfaces that restrict the part of it that is a wall.
         doorways: volumes that take the wall away where another part is behind it.
     """
 
@@ -99,7 +99,7 @@ class Part:
     doorways: tuple[Cover, ...] = ()
 
     def level(self, points: Floats, outwards: Floats, size: float, near: list[Cover]) -> Floats:
-        """The level with respect to all covers. Covers that are not `near` take nothing away."""
+        """Return the level with respect to all covers. Covers that are not `near` take nothing away."""
         found = np.full(len(points), -size)
         for cover in near:
             found = np.maximum(found, cover.level(points, outwards, size))
@@ -111,7 +111,7 @@ class Part:
 
 
 def parts_of(scene: Scene, time: float) -> list[Part]:
-    """The parts of all surfaces at a time [s], in their order."""
+    """Return the parts of all surfaces at a time [s], in their order."""
     found = _Found(time, scene.doorways_of_parts(), scene.common_faces(), [])
     for i, surface in enumerate(scene.surfaces):
         found.add(Part(i, (), surface, False, found.beside(scene.surfaces, i, 1.0)))
@@ -119,7 +119,7 @@ def parts_of(scene: Scene, time: float) -> list[Part]:
 
 
 class _Found(NamedTuple):
-    """The parts that are found, the volumes of doorways of each, and which two have a face in common."""
+    """The parts that are found, the volumes of doorways of each part, and the pairs of parts that share a face."""
 
     time: float
     doorways: dict[tuple[int, Place], list[Surface]]
@@ -127,13 +127,13 @@ class _Found(NamedTuple):
     parts: list[Part]
 
     def _have_a_face(self, owner: int, one: Place, other: Place) -> bool:
-        """Whether a part of a surface, and another one, have a face in common that is no wall."""
+        """Whether two parts of a surface share a face that is no wall."""
         return any(
             i == owner and {pair[0][: len(one)], pair[1][: len(other)]} == {one, other} for i, *pair in self.common
         )
 
     def beside(self, surfaces: Sequence[Surface], k: int, sign: float, opened: Sequence[int] = ()) -> tuple[Cover, ...]:
-        """The covers of one of several surfaces, by the others, of which some have a face in common with it."""
+        """Return the covers of one of several surfaces by all others, some of which share a face with it."""
         return tuple(
             Cover(one, sign, side_of(one), self.time, first=j < k and not one.is_field, is_room=sign < 0.0,
                   opens=sign < 0.0 and j in opened)
@@ -141,11 +141,11 @@ class _Found(NamedTuple):
         )  # fmt: skip
 
     def open(self, volumes: Iterable[Surface]) -> tuple[Cover, ...]:
-        """The covers by volumes in which a wall is open."""
+        """Return the covers by volumes in which a wall is open."""
         return tuple(Cover(one, -1.0, sign_of(one), self.time) for one in volumes if one.is_there(self.time))
 
     def add(self, part: Part) -> None:
-        """Add a part, or what it consists of."""
+        """Add a part, or the parts that it consists of."""
         whole: Any = part.surface
         solid = part.solid ^ whole.is_solid()
         if not whole.parts:

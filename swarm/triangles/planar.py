@@ -1,4 +1,4 @@
-"""The walls of a scene of two dimensions as shapes to draw: curves in its plane, and a low ribbon along each."""
+"""The walls of a two-dimensional scene as shapes to draw: curves in its plane, and a low ribbon along each."""
 
 import contourpy
 import numpy as np
@@ -18,7 +18,7 @@ from .cut import Level, SmoothSurface
 from .gridded import Corners, around
 from .parts import Part
 
-# Points along each side of the grid on which curves are found, and of a small body on a grid of its own.
+# Points along each side of the grid on which curves are found, and on which a small body is found
 _POINTS, _BODY = 500, 60
 # Bisections of a piece of a curve at the end of a wall.
 _BISECTIONS = 20
@@ -49,7 +49,7 @@ class PlaneWalls:
         self._coarse = self._curves(self._box)
 
     def curves(self, i: int, pose: Pose, bodies: int) -> list[Floats]:
-        """The curves (k, 3) [m] of surface i."""
+        """Return the curves (k, 3) [m] of surface i."""
         surface = self._scene.surfaces[i]
         known = surface.plane_curves(self._across)
         if known is not None and not bodies:
@@ -68,7 +68,7 @@ class PlaneWalls:
         return self._of(i, self._curves(around(points, self._box, _POINTS)))
 
     def of_part(self, part: Part) -> list[Floats]:
-        """The curves of a part of a surface where it is a wall, each end where it meets another one."""
+        """Return the curves of a part of a surface where it is a wall; each ends where it meets another curve."""
         surface, at = part.surface, pose(part.surface.motion, self._time)
         walls = [SmoothSurface(*one) for one in surface.level_sets()]
         known = None if surface.body_count() else surface.plane_curves(self._across)
@@ -89,7 +89,7 @@ class PlaneWalls:
     def _cut(
         self, part: Part, wall: SmoothSurface, others: list[SmoothSurface], curves: list[Floats], at: Pose
     ) -> list[Floats]:
-        """The parts of curves on a smooth wall that are a wall of the scene."""
+        """Return the parts of curves on a smooth wall that are a wall of the scene."""
         size = float((self._box[1] - self._box[0]).max())
         side = -1.0 if part.surface.is_solid() else 1.0
 
@@ -109,7 +109,7 @@ class PlaneWalls:
         return found
 
     def strip(self, curves: list[Floats]) -> Strip:
-        """The ribbon on curves: vertices, triangles and normals."""
+        """Return the ribbon on curves: vertices, triangles and normals."""
         vertices, triangles, normals, first = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], [np.empty((0, 3))], 0
         up = np.zeros(3)
         up[self._across] = 0.5 * self.height
@@ -126,7 +126,7 @@ class PlaneWalls:
     # --- On a grid ---
 
     def _curves(self, box: Corners) -> list[Floats]:
-        """All walls in a box."""
+        """Return the curves of all walls in a box."""
 
         def largest_gap(points: Floats) -> Floats:
             gap = self._scene.gaps(points.T, self._time).max(axis=0)
@@ -135,7 +135,7 @@ class PlaneWalls:
         return self._lines(box, _POINTS, largest_gap)
 
     def _lines(self, box: Corners, count: int, level: Level) -> list[Floats]:
-        """The curves in a box of the plane at which a level is 0, by so many points of a grid along each side."""
+        """Return the curves in a box of the plane at which a level is 0, from a grid with `count` points a side."""
         sides = [np.linspace(low, high, count) for low, high in zip(*box, strict=True)]
         with np.errstate(all="ignore"):
             values = level(self._placed(np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)))
@@ -143,7 +143,7 @@ class PlaneWalls:
         return [self._placed(np.asarray(line)) for line in lines]
 
     def _of(self, i: int, curves: list[Floats]) -> list[Floats]:
-        """The parts of curves that are of surface i, without its openings."""
+        """Return the parts of curves that belong to surface i, without its openings."""
         found, pieces = [], self._scene.pieces
         for curve in curves:
             with np.errstate(all="ignore"):
@@ -155,7 +155,7 @@ class PlaneWalls:
         return found
 
     def _around(self, solid: Surface) -> list[Floats]:
-        """The curves of one of many bodies."""
+        """Return the curves of one of many bodies."""
         reach, center = 2.0 * solid.size(), np.array(getattr(solid, "center", (0.0, 0.0, 0.0)))[list(self._axes)]
         low, high = self._box
         if np.isfinite(reach):
@@ -165,14 +165,14 @@ class PlaneWalls:
         return self._lines((low, high), _BODY, lambda points: solid.phi(points.T))
 
     def _placed(self, points: Floats) -> Floats:
-        """Points of the plane (N, 2) in space (N, 3)."""
+        """Return points of the plane (N, 2) in space (N, 3)."""
         found = np.zeros((len(points), 3))
         found[:, list(self._axes)] = points
         return found
 
 
 def _end(level: Level, within: Floats, beyond: Floats) -> Floats:
-    """The point between two on a curve up to which a level is not above 0."""
+    """Return the point between two points on a curve up to which a level is not above 0."""
     for _ in range(_BISECTIONS):
         middle = 0.5 * (within + beyond)
         if level(middle[None])[0] <= 0.0:
@@ -183,7 +183,7 @@ def _end(level: Level, within: Floats, beyond: Floats) -> Floats:
 
 
 def _extent(surface: Surface, axes: tuple[int, int]) -> float:
-    """The distance from the origin within which a surface lies in the plane, up to the faces that it has not."""
+    """Return the distance from the origin within which a surface lies in the plane, up to its open faces."""
     box = np.array(surface.enclosing_box())
     if faces := surface.open_faces():
         box = np.array(polyhedron_bounds(faces, *box))

@@ -11,8 +11,8 @@ from ..state import Floats
 from ..surfaces.union import Place
 from . import curves
 
-# Heights at which levels are drawn, of which a shape has this many, or else its own; triangles of many bodies that are
-# too many for these.
+# The number of heights at which levels are drawn, of which a shape has at least the second number, or else its own; and
+# the triangles above which many bodies have no levels.
 _LEVELS, _FEW, _MOST = 6, 3, 100_000
 # Triangles with normals that differ from the vertical by less than this lie on a level.
 _UPRIGHT = 1e-6
@@ -23,17 +23,16 @@ class Shape:
     """The part of one surface that is a wall of the volume.
 
     Attributes:
-        name: its number and kind, such as "0_ellipsoid"; of a part of a union, "0_union_1_cylinder".
-        surface: the number of the surface in the scene; place: of a part in that.
-        motion: of a part of a union its own; else None, and it moves with the surface.
+        name: its number and kind, such as "0_ellipsoid"; for a part of a union "0_union_1_cylinder".
+        surface: the number of the surface in the scene; place: the number of the part in the surface.
+        motion: the motion of its own that a part of a union has; else None, and the shape moves with the surface.
         solid: whether particles are kept out of it.
         vertices, triangles, normals: (V, 3) [m], (T, 3), (V, 3).
         edges: curves (k, 3) [m]: creases, rims, and the ends of openings.
-        height: of the ribbon that the triangles are, in a scene of two dimensions [m]; else None.
-        many: whether it is that of many bodies.
-        levels: its curves at some heights, the same of all shapes.
-        members: for each triangle the number of the body, or of the triangle of a mesh, that it is of; None where it is
-            of neither.
+        height: the height of the ribbon of triangles in a two-dimensional scene [m]; else None.
+        many: whether the shape shows many bodies.
+        levels: its curves at some heights, which are the same for all shapes.
+        members: for each triangle the number of its body, or of its triangle of a mesh; None where there is neither.
     """
 
     name: str
@@ -67,14 +66,14 @@ class Shape:
         return float(0.5 * np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).sum())
 
     def moved(self, turn: Floats, way: Floats) -> "Shape":
-        """The shape moved so that its point that was at x is at turn x + way."""
+        """Return the shape moved so that its point at x comes to turn x + way."""
         placed = [[curve @ turn.T + way for curve in of] for of in (self.edges, self.levels)]
         return replace(self, vertices=self.vertices @ turn.T + way, normals=self.normals @ turn.T,
                        edges=placed[0], levels=placed[1])  # fmt: skip
 
 
 def levelled(shapes: list[Shape]) -> list[Shape]:
-    """The shapes with their levels, between the lowest and the highest point of all of them."""
+    """Return the shapes with their levels, between the lowest and the highest point of all of them."""
     ends = [(shape.vertices[:, 2].min(), shape.vertices[:, 2].max()) for shape in shapes if len(shape.vertices)]
     if not ends:
         return shapes
@@ -87,7 +86,7 @@ def levelled(shapes: list[Shape]) -> list[Shape]:
 
 
 def _levels(shape: Shape, heights: Floats) -> list[Floats]:
-    """The curves at these heights, but for walls that lie on one."""
+    """Return the curves at these heights, without walls that lie on one of them."""
     if not len(shape.vertices):
         return []
     low, high = shape.vertices[:, 2].min(), shape.vertices[:, 2].max()

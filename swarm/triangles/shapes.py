@@ -19,7 +19,7 @@ from .shape import Shape, levelled
 
 
 def those_there(positions: Floats) -> Floats:
-    """The positions (3, N) that are not NaN; the origin if there are no such positions."""
+    """Return the positions (3, N) that are not NaN; the origin if there are no such positions."""
     there = ~np.isnan(positions[0])
     if len(there) and there.all():
         return positions
@@ -27,9 +27,9 @@ def those_there(positions: Floats) -> Floats:
 
 
 def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = math.inf) -> list[Shape]:
-    """A shape for every surface at a time [s]; where the volume is open, as far as surfaces and particles (3, N) go.
+    """Return the shapes of every surface at a time [s]; an open volume ends where surfaces and particles (3, N) end.
 
-    That of a field of more than `most` solids is empty: see solids.py.
+    The shape of a field of more than `most` solids is empty: see solids.py.
     """
     positions = those_there(positions)
     if scene.plane is not None:
@@ -57,7 +57,7 @@ def shapes_of(scene: Scene, positions: Floats, time: float = 0.0, most: float = 
 
 
 def cell_of(scene: Scene) -> list[Shape]:
-    """The edges of the cell of a period, from the origin on, where a scene has no walls around its particles."""
+    """Return the edges of the cell of a period, from the origin on, where a scene has no walls around its particles."""
     period = scene.period
     if period is None or None in period or scene.plane or not all(one.is_solid() for one in scene.surfaces):
         return []
@@ -71,13 +71,13 @@ def cell_of(scene: Scene) -> list[Shape]:
 
 
 def _grouped(scene: Scene) -> set[int]:
-    """The listed solids that are fields."""
+    """Return the listed solids that are fields."""
     compiled = scene.compiled()
     return {compiled.pieces.owners[k] for group in compiled.order.groups for k in group}
 
 
 def _sharp(scene: Scene, box: Corners, time: float) -> dict[int, list[Shape]]:
-    """The shapes of every surface but those of many bodies, of unions those of each part."""
+    """Return the shapes of every surface without those of many bodies; for a union those of each part."""
     found: dict[int, list[Shape]] = {}
     for part in parts_of(scene, time):
         whole = scene.surfaces[part.owner]
@@ -116,9 +116,9 @@ def _shapes_in_plane(scene: Scene, positions: Floats, time: float, most: float) 
 
 
 def since_start(scene: Scene, shape: Shape, time: float, places: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-    """The turn and the way of a shape since the start: its point that was at x0 is at turn x0 + way.
+    """Return the turn and the way of a shape since the start: its point that was at x0 is at turn x0 + way.
 
-    `places` are the observables at a frame, `wall_position` and `wall_orientation`, and `time` is that of it [s].
+    `places` are the observables `wall_position` and `wall_orientation` at a frame, and `time` is the frame's time [s].
     """
     # x1 = A1 A0^T (x0 - p0) + p1, with places p of the origin
     if shape.motion is not None:

@@ -1,4 +1,4 @@
-"""A part of a surface as triangles with its edges sharp: each smooth wall by itself, cut by all others."""
+"""A part of a surface as triangles with sharp edges: each smooth wall by itself, cut by all others."""
 
 import itertools
 from collections.abc import Iterator
@@ -20,17 +20,16 @@ from .curves import neighbours
 from .cut import MOST_BODIES, Cut, SmoothSurface, cut, found_in
 from .parts import Cover, Part
 
-# Of the size of what is drawn, a step along edges of a mesh that others may cut.
+# The steps in the size of the drawing along edges of a mesh that others may cut
 _FINE = 200
-# A point this near to a cut, as a part of the size of a wall, is on it, and this near to a corner
-# it is there; moves to a corner.
+# A point within the first distance of a cut, as a part of the size of a wall, is on the cut; within the second distance
+# of a corner it is at the corner; the third number is that of moves to a corner.
 _ON_A_CUT, _AT_A_CORNER, _MOVES = 1e-8, 1e-4, 4
-# A wall of which this part of its box is seen is found again in the box of that, so often.
+# A wall that fills less than this part of its box is found again in a closer box, at most this many times.
 _SEEN, _AGAIN = 0.4, 3
 
 Box = tuple[Floats, Floats]
-# Points (V, 3) [m], triangles (T, 3), normals (V, 3); and its edges.
-# Triangles, edges, and of a mesh the number of its triangle for each of them.
+# Points (V, 3) [m], triangles (T, 3), normals (V, 3); edges; for a mesh the number of its triangle for each triangle.
 Walls = tuple[tuple[Floats, Indices, Floats], list[Floats], Indices | None]
 
 
@@ -42,10 +41,10 @@ class _Placed(NamedTuple):
     frame: Floats  # columns are its axes
     low: Floats  # of the box along these
     high: Floats
-    size: float  # of what is drawn [m]
+    size: float  # of the drawing [m]
 
     def level(self, wall: SmoothSurface, covers: list[Cover], others: list[SmoothSurface]) -> Any:
-        """A function of points that is above 0 where the wall is taken away."""
+        """Return a function of points that is above 0 where the wall is taken away."""
 
         def above(points: Floats) -> Floats:
             outwards = self.side() * self.pose.turned(wall.normals(points).T).T
@@ -61,7 +60,7 @@ class _Placed(NamedTuple):
 
 
 def drawn(part: Part, box: Box, time: float) -> Walls:
-    """The part of a scene in a box, at a time [s]."""
+    """Return the triangles of the part of a scene in a box, at a time [s]."""
     if isinstance(part.surface, Mesh):
         return _facets(part, part.surface, box)
     surface, at = part.surface, pose(part.surface.motion, time)
@@ -90,7 +89,7 @@ def drawn(part: Part, box: Box, time: float) -> Walls:
 
 
 def _facets(part: Part, surface: Mesh, box: Box) -> Walls:
-    """The triangles of a mesh as they are, or what of them is a wall."""
+    """Return the triangles of a mesh as they are, or the part of them that is a wall."""
     frame, (low, high) = matrix(surface.rotation), box
     placed = _Placed(part, pose(None, 0.0), frame, low, high, float((high - low).max()))
     points, triangles, numbers = surface.corners, surface.triangles, np.arange(len(surface.triangles))
@@ -110,7 +109,7 @@ def _facets(part: Part, surface: Mesh, box: Box) -> Walls:
 
 
 def _both_sides(points: Floats, triangles: Indices) -> tuple[Floats, Indices, Floats]:
-    """The triangles of sheets, each seen from both sides."""
+    """Return the triangles of sheets, each seen from both sides."""
     sides = [shaded(points, turned) for turned in (triangles, triangles[:, ::-1])]
     (here, cells, normals), (there, others, opposite) = sides
     return (
@@ -121,16 +120,16 @@ def _both_sides(points: Floats, triangles: Indices) -> tuple[Floats, Indices, Fl
 
 
 def _pieces(placed: _Placed) -> Iterator[tuple[Any, SmoothSurface]]:
-    """The triangles of every smooth wall, cut, and the wall."""
+    """Yield the triangles of every smooth wall, cut, and the wall."""
     surface: Any = placed.part.surface
     walls = [SmoothSurface(*one) for one in surface.level_sets()]
     upright = surface.upright(float(placed.low[2]), float(placed.high[2]))
     if isinstance(surface, Cone):
-        # Of the plane through the apex only that point is a wall.
+        # The plane through the apex is a wall at that point only.
         walls = walls[-1:]
     if upright is not None:
         points, triangles = upright
-        # Moved onto themselves, they would stay where they are.
+        # The points are on the wall already: phi = 0 leaves them where they are.
         wall = SmoothSurface(lambda points: np.zeros(len(points)), walls[0].gradient)
         level = placed.level(wall, _near(placed, points), [])
         yield cut(wall, points, triangles, level), wall
@@ -157,9 +156,9 @@ def _pieces(placed: _Placed) -> Iterator[tuple[Any, SmoothSurface]]:
 
 
 def _with_corners(found: Cut, wall: SmoothSurface, others: list[SmoothSurface], level: Any) -> Cut:
-    """A wall with its corners, at which two others meet on it: a cut is straight within each triangle.
+    """Return a wall with its corners, where two others meet on it: a cut is straight within each triangle.
 
-    An edge from one of the others to another one goes by the corner; what is between these is one more triangle.
+    An edge from one of the others to another one passes the corner; the gap between them is one more triangle.
     """
     size = float(np.ptp(found.points, axis=0).max())
     for one, other in itertools.combinations(others, 2):
@@ -190,7 +189,7 @@ def _with_corners(found: Cut, wall: SmoothSurface, others: list[SmoothSurface], 
 
 
 def _crossing(walls: tuple[SmoothSurface, ...], points: Floats, reach: Any) -> Floats:
-    """The place near each point at which three walls cross; the point where that is farther than its reach."""
+    """Return the place near each point at which three walls cross; the point itself where it is beyond the reach."""
     places = points
     for _move in range(_MOVES):
         slopes = np.stack([each.gradient(places) for each in walls], axis=1)
@@ -201,7 +200,7 @@ def _crossing(walls: tuple[SmoothSurface, ...], points: Floats, reach: Any) -> F
 
 
 def _near(placed: _Placed, points: Floats) -> list[Cover]:
-    """The covers that may take away something of a wall with these points."""
+    """Return the covers that may take away a part of a wall with these points."""
     if not len(points):
         return []
     here = placed.pose.placed(points.T)
@@ -210,7 +209,7 @@ def _near(placed: _Placed, points: Floats) -> list[Cover]:
 
 
 def _frame(surface: Surface) -> tuple[Floats, Surface]:
-    """A frame along the axes of a surface, the columns of a matrix, and the surface in that."""
+    """Return a frame along the axes of a surface, the columns of a matrix, and the surface in that frame."""
     whole: Any = surface
     frame, own = whole.own_frame()
     own |= {"motion": None, "mass": None, "inertia": None}
@@ -222,13 +221,13 @@ def _frame(surface: Surface) -> tuple[Floats, Surface]:
 
 
 def _triangles(placed: _Placed, wall: SmoothSurface, low: Floats, high: Floats) -> tuple[Floats, Indices]:
-    """Triangles on a smooth wall in a box."""
+    """Return triangles on a smooth wall in a box."""
     made = placed.part.surface.triangulated(low, high, placed.frame)
     return made or found_in(wall, low, high, placed.frame, any(one.surface.is_field for one in placed.part.covers))
 
 
 def _turned_to(points: Floats, triangles: Indices, normals: Floats) -> NDArray[np.int64]:
-    """Triangles with corners that go round their normals."""
+    """Return the triangles with corners that go round their normals."""
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     wrong = (np.cross(b - a, c - a) * normals[triangles].sum(axis=1)).sum(axis=1) < 0.0
     return np.where(wrong[:, None], triangles[:, ::-1], triangles)
@@ -249,7 +248,7 @@ def without_gaps(normals: Floats, triangles: Indices) -> Floats:
 
 
 def shaded(points: Floats, triangles: Indices) -> tuple[Floats, Indices, Floats]:
-    """Triangles with normals at their corners: those at which edges meet are a corner for each side of an edge."""
+    """Return triangles with normals at their corners: a corner at an edge is one corner for each side of the edge."""
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     normal = np.cross(b - a, c - a)
     # Corners of two triangles at a point are one where these meet smoothly at a side.

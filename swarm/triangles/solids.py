@@ -1,4 +1,4 @@
-"""Fields of many solids as what each of them is, a few numbers, without triangles: places, sizes and directions.
+"""Fields of many solids by a few numbers for each, without triangles: places, sizes and directions.
 
 For viewers that draw a million of them from one mesh: Rerun (instanced.py) and ParaView (walls.py).
 """
@@ -14,7 +14,7 @@ from ..state import Floats
 from ..surfaces.rotation import after, matrices, normalized, onto
 from ..surfaces.surface import Surface
 
-# A field of more solids is shown so.
+# A field of more solids than this is shown in this way.
 MANY = 2_000
 _CIRCLE = 25
 _CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
@@ -39,18 +39,18 @@ class Solids(NamedTuple):
 
 
 def solids_of(scene: Scene, time: float) -> list[Solids]:
-    """The fields of many solids of a scene that are there at a time [s], where they are then."""
+    """Return the fields of many solids of a scene that are present at a time [s], at their places then."""
     each = enumerate(zip(scene.surfaces, scene.poses(time), strict=True))
     return [_placed(i, surface, at) for i, (surface, at) in each if is_many(surface) and surface.is_there(time)]
 
 
 def is_many(surface: Surface) -> bool:
-    """Whether a surface is a field of so many solids that it is shown as what each is."""
+    """Whether a surface is a field of more than `MANY` solids, each of which is shown by a few numbers."""
     return surface.body_count() > MANY and surface.halves() is not None
 
 
 def _placed(i: int, surface: Any, at: Pose) -> Solids:
-    """The solids of surface i, in its pose."""
+    """Return the solids of surface i, in its pose."""
     n, still = len(surface), np.array([1.0, 0.0, 0.0, 0.0])
     turns: Any = np.broadcast_to(still, (n, 4))
     if getattr(surface, "rotations", None) is not None:
@@ -66,7 +66,7 @@ def _placed(i: int, surface: Any, at: Pose) -> Solids:
 
 
 def curves(solids: Solids, most: int = MANY) -> list[Floats]:
-    """Curves (k, 3) of at most so many of them, evenly chosen: three ellipses, of a box or a cylinder its outlines."""
+    """Curves (k, 3) of at most `most` solids, evenly chosen: three ellipses; for boxes and cylinders outlines."""
     some = slice(None, None, math.ceil(len(solids.centers) / most))
     angle = np.linspace(0.0, 2.0 * math.pi, _CIRCLE)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
