@@ -23,7 +23,7 @@ from .numbers import Bend
 
 # Central differences are most exact with steps of the cube root of round-off, relative to the length.
 _DIFFERENCE = EPSILON ** (1.0 / 3.0)
-# Where second derivatives are only sampled: the number of points, the factor that widens their range, the rest.
+# Where second derivatives are only sampled: the number of points, a factor for their range, and the part that they miss
 _SAMPLES = 4096
 _SAFETY = 2.0
 _NOISE = 1e-6

@@ -213,7 +213,7 @@ class PolynomialFlight(Guessed):
         excess = rise_by(positive(a3 + positive(a4) * reach), reach)
         time = rise_time(c, b, a2 + excess)
         at_root, step = time <= reach, select(time < reach, time, reach)
-        # The level there is -left: one step of Newton's method goes on from it.
+        # The level there is -left: one step of Newton's method continues from it.
         left = step * step * (excess - step * (a3 + step * a4))
         slope = 2.0 * b + step * (2.0 * a2 + step * (3.0 * a3 + step * (4.0 * a4)))
         rises = at_root & (slope > 0.0)

@@ -324,7 +324,7 @@ class Between(Record):
 
 
 def nearest_root(c, b, a):
-    """The time, ahead or back, to the nearest rise of c + 2 b t + a t^2 through 0; infinite if it falls here."""
+    """The time, ahead or back, to the nearest rise of c + 2 b t + a t^2 through 0; infinite unless it rises here."""
     bottom = b + _root(b * b - a * c)
     return select(b > 0.0, -c / select(b > 0.0, bottom, 1.0), math.inf)
 
