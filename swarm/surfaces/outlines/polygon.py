@@ -110,6 +110,6 @@ class Prism(Outlined):
         super().__post_init__()
         if self.side != "inside":
             raise SceneError(
-                f'side must be "inside" for a Prism, got {self.side!r}; of a solid that reaches through its vessel '
-                "make a Polygon, or of a bounded one a union or a mesh"
+                f'side must be "inside" for a Prism, got {self.side!r}; for a solid that reaches through its vessel '
+                "use a Polygon, for a bounded one a union or a mesh"
             )
