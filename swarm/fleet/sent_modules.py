@@ -10,7 +10,7 @@ _taken: set[bytes] = set()
 
 
 def send_code() -> list[str]:
-    """Let cloudpickle send the code of plugins that are not installed, and their packages; return the modules' names."""
+    """Let cloudpickle send the code of plugins that are not installed, and their packages; return their names."""
     import cloudpickle
 
     names = plugins.not_installed()

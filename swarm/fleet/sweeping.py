@@ -65,7 +65,7 @@ class SweepOptions(Validated):
 
 @dataclass(frozen=True)
 class Outcome:
-    """The end of a sweep: its results, the reason of a stop ("interrupted", "walltime") or "", and its wall time [s]."""
+    """The end of a sweep: its results, the reason of a stop ("interrupted", "walltime") or "", and wall time [s]."""
 
     results: Results
     stopped: str
@@ -95,7 +95,7 @@ def sweep(  # noqa: PLR0913  the keywords are the public interface
         "run.until" = {linspace = [1.0, 2.0, 5]}    # or geomspace
 
     Every run is an ordinary one, with its trajectory STEM.h5, its checkpoint, and STEM.json, which notes its end; the
-    stem is a digest of its scene, so that lists can be made longer later. The error of a run that fails is
+    stem is a digest of its scene, so that lists can be made longer later. A run that fails has its error
     in its row, and does not stop the others. Scripts need no `if __name__ == "__main__"`.
 
     Args:
@@ -272,7 +272,7 @@ def line_of(pace: Pace, runs: int, done: int, failed: int, shares: Collection[fl
 
 
 def _in_order(variants: list[Variant]) -> Iterator[Variant]:
-    """The first variant of each kind, then the others: workers compile the kernels of several kinds at the same time."""
+    """The first variant of each kind, then the others: workers compile kernels of several kinds at the same time."""
     kinds: set[str] = set()
     rest: list[Variant] = []
     for variant in sorted(variants, key=lambda one: one.number):
