@@ -1,4 +1,4 @@
-"""Docstrings in sections: what each argument means, what is returned, the errors, the example."""
+"""Docstrings in sections: the meaning of each argument, the result, the errors, the example."""
 
 import inspect
 import re
@@ -13,7 +13,7 @@ _EXAMPLE = ">>> "
 
 
 def sections_of(value: Any) -> dict[str, str]:
-    """The sections of a docstring in their order: "" is the text before the first, and paragraphs between them.
+    """The sections of a docstring in order; "" has the text before the first section, and paragraphs between sections.
 
     >>> list(sections_of(sections_of))
     ['', 'Example']
@@ -31,14 +31,14 @@ def sections_of(value: Any) -> dict[str, str]:
             found.setdefault(name, []).extend([heading[2]] if heading[2] else [])
             continue
         elif name not in ("", "Example") and line and not line.startswith(" "):
-            # A paragraph behind a section, unless it is one of those that begin on the line of their heading.
+            # A paragraph after a section, unless the section begins on the line of its heading.
             name = name if name in _LINES and found[name] and found[name][-1] else ""
         found.setdefault(name, []).append(line)
     return {name: "\n".join(lines).strip("\n") for name, lines in found.items() if any(lines)}
 
 
 def entries_of(text: str) -> dict[str, str]:
-    r"""The entries of a section: names, and what is said of each in one line.
+    r"""The entries of a section: names, and the text of each in one line.
 
     >>> entries_of("    one, two: both of\n        them.\n    three: [m].")
     {'one': 'both of them.', 'two': 'both of them.', 'three': '[m].'}
@@ -56,7 +56,7 @@ def entries_of(text: str) -> dict[str, str]:
 
 
 def meanings_of(value: Any) -> dict[str, str]:
-    """What is said of each argument of a function or a class, of those of its bases too.
+    """The text on each argument of a function or a class, including those of its bases.
 
     >>> import swarm
     >>> meanings_of(swarm.Box)["restitution"].partition(":")[0]

@@ -14,9 +14,9 @@ from ..run.result import Result
 from ..run.simulation import carry_out
 from ..scene_file import OUTPUTS, Job, read
 
-# Keywords of `simulate` that are tables of a scene file, not keys of [run].
+# Keywords of `simulate` that are tables of a scene file instead of keys of [run].
 _TABLES = ("sources", "counters")
-# How Python names an output, for sentences.
+# The arguments of outputs in Python, for sentences.
 _IN_PYTHON = {"trajectory": "output={!r}", "recording": "recording={!r}", "impacts": "impacts={!r}"}
 
 
@@ -31,7 +31,7 @@ def run(
 
     Args:
         path: the scene file, TOML.
-        output: the trajectory to write; None: the one that the file names in [run], if any.
+        output: the trajectory to write; None: the one in [run] of the file, if any.
         plugins: modules with laws, surfaces, methods and observables, which the file may name as "module:Name".
         options: keywords of `simulate`, such as until, every, threads or progress, in place of the keys of [run].
 
@@ -40,9 +40,9 @@ def run(
 
     Raises:
         SceneError: the file cannot be read, a key or an option is unknown or out of its range; nothing has run.
-        FileError, RunError, KeyboardInterrupt, WallTimeError: as of `simulate`.
+        FileError, RunError, KeyboardInterrupt, WallTimeError: as for `simulate`.
 
-    Conserves: what the method of the file does, by default `Impact`.
+    Conserves: the same as the method of the file, by default `Impact`.
 
     >>> import pathlib, swarm, tempfile
     >>> text = '''
@@ -85,7 +85,7 @@ def run(
 
 
 def named_alone(job: Job, **given: Any) -> list[str]:
-    """The names of the outputs that the scene file names and the caller does not; these must be in its folder."""
+    """Return the outputs that the scene file names and the caller does not; they must be in the file's folder."""
     alone = [name for name, file in given.items() if file is None and getattr(job.run, name) is not None]
     job.require_within(alone)
     return alone
@@ -94,15 +94,15 @@ def named_alone(job: Job, **given: Any) -> list[str]:
 def check_outputs(job: Job, options: RunOptions, alone: list[str], allow: str, named: dict[str, str]) -> None:
     """Raise a SceneError if an output cannot be written, or may not be replaced.
 
-    An output that the scene file alone names is never overwritten, as the option to overwrite is for those that the
+    An output that only the scene file names is never overwritten, since the option to overwrite is for outputs that the
     caller names.
 
     Args:
         job: the scene file.
         options: the options of the run.
-        alone: the names of the outputs that the scene file alone names.
+        alone: the names of the outputs that only the scene file names.
         allow: for the sentence of the error, how to overwrite an output; {} is the output as the caller gives it.
-        named: name of an output -> how the caller gives it; {} is its path.
+        named: name of an output -> the argument of the caller for it; {} is its path.
     """
     paths.check_distinct({**options.files(), "recording": options.recording}, job.inputs())
     going_on = options.trajectory is not None and paths.checkpoint_of(options.trajectory).exists()
@@ -112,7 +112,7 @@ def check_outputs(job: Job, options: RunOptions, alone: list[str], allow: str, n
         if file is None:
             continue
         if not begins and name != "recording":
-            paths.check_place(file, name)  # the session reads what is there
+            paths.check_place(file, name)  # the session reads the existing file
         elif name in alone:
             marks.check_target(file, False, name, allow.format(named[name].format(str(file))))
         else:

@@ -1,7 +1,7 @@
-"""The keys of scene and sweep files, from the declarations by which these are read: form, default and meaning of each.
+"""The keys of scene and sweep files, from the declarations that read them: form, default and meaning of each.
 
-A form is a JSON Schema. That of a key follows from the type of its field and from the check that the field declares; of
-what has a type of its own, such as a motion, it is named here.
+A form is a JSON Schema. That of a key follows from the type of its field and from the check that the field declares; a
+field of a class of its own, such as a motion, has its form here.
 """
 
 import dataclasses
@@ -40,24 +40,24 @@ Form = dict[str, Any]
 NUMBER: Form = {"type": "number"}
 INTEGER: Form = {"type": "integer"}
 TEXT: Form = {"type": "string"}
-# Code of a user in a file.
+# Code of a user, named in a file.
 CODE: Form = {"type": "string", "pattern": r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$"}
 LENGTH: Form = {"type": "number", "minimum": checks.SMALLEST, "maximum": checks.LARGEST}
 NOT_NEGATIVE: Form = {"type": "number", "minimum": 0}
 
 
 def listed(form: Form, least: int = 0, most: int | None = None) -> Form:
-    """The form of a list."""
+    """Return the form of a list."""
     return {"type": "array", "items": form, "minItems": least} | ({} if most is None else {"maxItems": most})
 
 
 def either(*forms: Form) -> Form:
-    """One of several forms."""
+    """Return the form of a value that has one of several forms."""
     return forms[0] if len(forms) == 1 else {"anyOf": list(forms)}
 
 
 def named(name: str) -> Form:
-    """A form that has a name in the schema."""
+    """Return a form by its name in the schema."""
     return {"$ref": f"#/$defs/{name}"}
 
 
@@ -68,7 +68,7 @@ PART: Form = NOT_NEGATIVE | {"maximum": 1}
 COUNT: Form = {"type": "integer", "minimum": 1}
 SPANS = listed(listed(NUMBER, 2, 2), 1)
 
-# The forms that checks declare, with the keywords of a partial one.
+# The forms of checks, with the keywords of a partial one.
 _CHECKED: dict[Any, Any] = {
     checks.number: lambda **_words: NUMBER,
     checks.positive: lambda: {"type": "number", "exclusiveMinimum": 0},
@@ -86,7 +86,7 @@ _CHECKED: dict[Any, Any] = {
     checks.one_of: lambda choices: {"enum": list(choices)},
 }
 _PLAIN: dict[Any, Form] = {float: NUMBER, int: INTEGER, str: TEXT, bool: {"type": "boolean"}}
-# The forms of keys with a check of their own in their fields, or none, as what they hold is checked together.
+# The forms of keys with a check of their own in their fields, or with values that are checked together.
 _OF_KEYS: dict[str, Form] = {
     "side": {"enum": list(SIDES)},
     "rotation": either(
@@ -133,7 +133,7 @@ _OF_KEYS: dict[str, Form] = {
     "guides": listed({"type": "object", "required": ["point", "surface"]}),
     "cavities": listed({"type": "object", "required": ["surface", "carrier", "point"]}),
 }  # fmt: skip
-# Where a key of this name means something else.
+# The forms of keys with another meaning in a class.
 _OF_CLASS: dict[tuple[str, str], Form] = {
     ("Box", "open"): listed({"enum": [sign + axis for axis in "xyz" for sign in "+-"]}),
     ("Mesh", "open"): {"type": "boolean"},
@@ -156,7 +156,7 @@ _OF_CLASS: dict[tuple[str, str], Form] = {
     ("CercignaniLampis", "normal"): PART,
     ("CercignaniLampis", "tangential"): NOT_NEGATIVE | {"maximum": 2},
 }
-# The numbers of laws and bodies are checked together; none of these is below 0.
+# The numbers of laws and bodies are checked together; these are never below 0.
 _NOT_NEGATIVE = "barrier", "density", "edge", "length", "mass", "speed", "spin", "temperature", "time", "young"
 
 
@@ -164,11 +164,11 @@ class TableKey(NamedTuple):
     """A key of a table.
 
     Attributes:
-        name: in the file.
+        name: its name in the file.
         form: its form, a JSON Schema.
-        needed: whether the table needs it.
-        default: the value where it is left out.
-        meaning: in words.
+        needed: whether the table needs the key.
+        default: the value if it is left out.
+        meaning: its meaning in words.
     """
 
     name: str
@@ -184,7 +184,7 @@ class Table(NamedTuple):
     Attributes:
         place: the table, such as "surface".
         kind: the value of its key kind, or "".
-        meaning: in words.
+        meaning: its meaning in words.
         keys: its own keys, without the kind.
     """
 
@@ -195,7 +195,7 @@ class Table(NamedTuple):
 
 
 def form_of(kind: Any, owner: str, name: str) -> Form:
-    """The form of a field of a class, from its annotation; that of any value where nothing here has another."""
+    """The form of a field of a class, from its annotation; that of any value if it has no other."""
     if (owner, name) in _OF_CLASS:
         return _OF_CLASS[owner, name]
     found = _form(kind)
@@ -205,7 +205,7 @@ def form_of(kind: Any, owner: str, name: str) -> Form:
 
 
 def _form(kind: Any) -> Form | None:
-    """The form of an annotation; None if it says too little."""
+    """The form of an annotation; None if it is too general."""
     if hasattr(kind, "__metadata__"):
         for check in filter(callable, kind.__metadata__):
             words = check.keywords if isinstance(check, functools.partial) else {}
@@ -231,7 +231,7 @@ def _form(kind: Any) -> Form | None:
 
 
 def keys_of(cls: type[Any], meanings: Mapping[str, str] | None = None) -> tuple[TableKey, ...]:
-    """The keys of a class with objects that a table describes, with what `meanings` says of them, or its docstring."""
+    """The keys of a class whose objects tables describe, with their `meanings`, or those of its docstring."""
     known, found = meanings_of(cls) if meanings is None else meanings, []
     for field in kept_fields(cls):
         name = field.metadata.get("key", field.name)
@@ -242,7 +242,7 @@ def keys_of(cls: type[Any], meanings: Mapping[str, str] | None = None) -> tuple[
     return tuple(found)
 
 
-# What is said of keys of files alone.
+# The meanings of keys that only files have.
 _MORE = {
     "count": "how many, 1 or more.",
     "from": "a file beside the scene file that holds them.",
@@ -257,7 +257,7 @@ _FILE = TableKey("file", TEXT, meaning="a file beside the scene file.")
 
 @functools.cache
 def tables() -> tuple[Table, ...]:
-    """All tables of a scene file, in the order of the guide; those of kinds once for each kind."""
+    """All tables of a scene file, in the order of the guide; a table with kinds is there once for each kind."""
     placed = meanings_of(fill)
     runs = meanings_of(simulate)
     common = Table("surface", "", "keys of every surface.", keys_of(Surface))
@@ -322,12 +322,12 @@ def _body(kind: str, cls: type[Any]) -> Table:
     return Table("body", kind, first_line(makers[-1]), tuple(keys))
 
 
-# The calls that have the arguments of kinds of [body] that are not those of one maker.
+# The functions with the arguments of kinds of [body] that have no single maker.
 _MAKERS: dict[str, tuple[Any, ...]] = {"elastic": (block, elastic), "points": (Bodies, Body)}
 
 
 def _bounded(name: str) -> Form:
-    """The form of a number of a body or a law."""
+    """Return the form of a number of a body or a law."""
     return NOT_NEGATIVE if name in _NOT_NEGATIVE else NUMBER
 
 

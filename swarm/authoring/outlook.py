@@ -1,4 +1,4 @@
-"""What the run of a scene file will do, without running it: what runs where, its hints, its sizes, about its time."""
+"""The outlook on the run of a scene file, without running it: its setting, hints, sizes, and estimated time."""
 
 import contextlib
 import logging
@@ -36,23 +36,23 @@ from .file_run import named_alone
 
 # Bytes of a row of a log of impacts, and of Python with NumPy, Numba and HDF5.
 _ROW, _PROGRAM = 112, 2e8
-# What a frame takes besides its impacts: of each particle [s], and of its bytes on the disk [bytes/s].
+# The cost of a frame besides its impacts: of each particle [s], and the pace of writing to the disk [bytes/s].
 _SEEN, _WRITTEN = 7e-8, 3e8
-# Times of one core [s], from `bench/results`: an impact on a wall in straight flights, in a fall, where a flight takes
+# Times of one core [s], from `bench/results`: an impact on a wall in straight flights, in a fall, if a flight takes
 # steps, on one of many bodies or triangles; an impact of balls; a step of a ball by Penalty, of a point by springs and
-# by multipliers, and of a point or link of a body; an impact on a wall, or on one of many, that moves other than
-# uniformly. A step of a ball in a union takes that for each of its rooms too: with 2 to 4 rooms 3 to 9 times as long.
+# by multipliers, and of a point or link of a body; an impact on a wall, or on one of many, with non-uniform
+# motion. A step of a ball in a union takes this time for each of its rooms: with 2 to 4 rooms 3 to 9 times as long.
 _STRAIGHT, _FALL, _STEPS, _FIELD = 4e-9, 2e-8, 5e-7, 1e-7
 _MOVED, _MOVED_FIELD = 1e-6, 5e-6
 _BALLS, _GRAIN, _SPRING, _SWEEPS, _PART = 2e-7, 2e-6, 5e-10, 5e-7, 2e-8
-# Steps of a crossing of a particle that slides, and what each takes, also where it rests on a wall that moves [s].
+# Steps of a sliding particle in a crossing of the scene, and the time of each, also at rest on a moving wall [s].
 _STEPS_A_CROSSING, _SLIDING = 150, 1e-6
-# In plain Python: an impact, and a step of a point or link of a body. A kernel to compile, and that of bodies. To begin
-# and end a run, and the next run of a sweep [s].
+# In plain Python: an impact, and a step of a point or link of a body. Compilation of a kernel, and of that of bodies.
+# The start and end of a run, and of the next run of a sweep [s].
 _PYTHON, _PYTHON_PART, _COMPILING, _COMPILING_BODIES, _BEGINNING, _NEXT = 1e-4, 4e-4, 1.2, 7.0, 0.5, 0.03
-# So long a run stays in plain Python, see run/tiers.py [s].
+# The time that a run stays in plain Python, see run/tiers.py [s].
 _IN_PYTHON = 1.0
-# Particles of which the engine is made, to see which kernels it needs; runs from which the size of a sweep follows.
+# The largest number of particles for which kernels are determined; the number of runs that stand for a sweep.
 _MOST, _MOST_RUNS = 200_000, 24
 
 
@@ -60,11 +60,11 @@ class Workload(NamedTuple):
     """The work of a run.
 
     Attributes:
-        events: how many there are.
-        noun: what they are.
-        cost: of one [s of a core].
-        shared: whether threads share them.
-        plain: the cost of one in plain Python [s].
+        events: the number of events.
+        noun: their name.
+        cost: the time of one [s of a core].
+        shared: whether threads share the events.
+        plain: the time of one in plain Python [s].
     """
 
     events: float
@@ -75,10 +75,10 @@ class Workload(NamedTuple):
 
 
 def outlook(job: Job, target: Path, makes_folder: bool = False) -> dict[str, str]:
-    """What the run of a job would do, with the trajectory in `target`, in a folder that may be made: rows of a table.
+    """The outlook on the run of a job with the trajectory `target`, in a folder that may be created: rows of a table.
 
     Raises:
-        SceneError: it would be refused.
+        SceneError: the run would be refused.
     """
     start = job.start()
     try:
@@ -99,7 +99,7 @@ def outlook(job: Job, target: Path, makes_folder: bool = False) -> dict[str, str
 def outlook_of_file(
     path: Path, output: Path | None = None, threads: int | None = None, plugins: Iterable[str] = ()
 ) -> dict[str, str]:
-    """What `swarm run` would do with a scene file, or `swarm sweep` with a sweep file: its first run stands for all.
+    """The outlook on a scene file for `swarm run`, or on the first run of a sweep file for `swarm sweep`.
 
     Raises:
         SceneError: it would be refused.
@@ -126,7 +126,7 @@ def outlook_of_file(
 
 
 def _of_all(plan: Plan, path: Path, plugins: Iterable[str], threads: int | None) -> str:
-    """The size of the trajectories of a sweep and the time of its runs, from some of them where they are many."""
+    """The size of the trajectories of a sweep and the time of its runs, estimated from a few if there are many."""
     some = plan.variants[:: -(-len(plan.variants) // _MOST_RUNS)]
     size = seconds = 0.0
     with allowed(plugins):
@@ -145,7 +145,7 @@ def _of_all(plan: Plan, path: Path, plugins: Iterable[str], threads: int | None)
 
 
 def _content(task: Task, start: Any, name: str) -> Content:
-    """What words are made of, as it is at the start."""
+    """The content at the start for sentences."""
     times = task.options.times
     ends = np.linspace(0.0, times.until, min(times.count, 10_000_000))
     body = None if task.bodies is None else start.body
@@ -158,7 +158,7 @@ def _content(task: Task, start: Any, name: str) -> Content:
 
 @contextlib.contextmanager
 def _caught() -> Iterator[list[str]]:
-    """The warnings of the package, in place of the screen."""
+    """Collect the warnings of the package, in place of printing them."""
     log, found = logging.getLogger("swarm"), list[str]()
     handler = logging.Handler(logging.WARNING)
     handler.emit = lambda record: found.append(record.getMessage())  # type: ignore[method-assign]
@@ -187,7 +187,7 @@ def _sizes(task: Task, target: Path, there: str) -> dict[str, str]:
     if options.recording is not None:
         there = _there(options.recording, "recording")
         files.append((f"recording {options.recording}", f"at most {options.record_megabytes:g} MB", there))
-    # HDF5 holds a chunk of frames until it is full.
+    # HDF5 buffers a chunk of frames until it is full.
     held = min(options.times.count, 1 if storage.compression != "none" else CHUNK_FRAMES) * storage.bytes_of(n)
     memory = PARTICLE * n + options.times.in_memory(surfaces) + held + waiting_bytes(n)
     return {
@@ -197,13 +197,13 @@ def _sizes(task: Task, target: Path, there: str) -> dict[str, str]:
 
 
 def _on_disk(task: Task) -> float:
-    """The bytes of the trajectory, before compression."""
+    """The bytes of the trajectory without compression."""
     times, storage = task.options.times, task.options.storage
     return times.on_disk(len(task.scene.surfaces)) + size_of(task.scene, task.particles, storage, times.count)
 
 
 def _there(path: Path, what: str) -> str:
-    """What stands against a new file, or nothing."""
+    """The obstacle to a new file, or ""."""
     try:
         marks.check_target(path, False, what)
     except SceneError as error:
@@ -215,7 +215,7 @@ def _there(path: Path, what: str) -> str:
 
 
 def _time(task: Task) -> dict[str, str]:
-    """About how long the run takes, from the flights at its start and the costs of `bench/results`."""
+    """The estimated time of the run, from the flights at its start and the costs of `bench/results`."""
     (loads, seconds, python), options = _work(task), task.options
     threads = options.thread_count()
     compiling = _COMPILING if task.bodies is None else _COMPILING_BODIES
@@ -223,7 +223,7 @@ def _time(task: Task) -> dict[str, str]:
     stated = {"work": f"about {work}"} if work else {}
     missing, kernels, begins_plain = _kernels(task)
     is_plain = begins_plain and python < _BEGINNING + _IN_PYTHON
-    # Balls that settle meet one another and walls far more often, how often the start does not show.
+    # Balls that settle collide with one another and walls far more often than the start shows.
     more = ", and more where balls settle" if task.particles.radius is not None and _settles(task) else ""
     if options.compile == "never" or is_plain:
         return stated | {"time": f"about {_about(python)}, in plain Python{more}"}
@@ -244,7 +244,7 @@ def _work(task: Task) -> tuple[list[Workload], float, float]:
 
 
 def _about(seconds: float) -> str:
-    """A time in a suitable unit, with the digits that an estimate has."""
+    """A time in a suitable unit, with the digits of an estimate."""
     for size, unit in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 2.0 * size:
             return f"{float(f'{seconds / size:.2g}'):g} {unit}"
@@ -252,7 +252,7 @@ def _about(seconds: float) -> str:
 
 
 def _loads(task: Task) -> list[Workload]:
-    """The work of a run, as far as its start shows it."""
+    """The work of a run, estimated from its start."""
     options, method, n = task.options, task.method, len(task.particles)
     engine = knows.engine_of(knows.Asked(task.scene, task.bodies or task.particles, method, options))
     dt = getattr(method, "dt", None)
@@ -277,33 +277,33 @@ def _loads(task: Task) -> list[Workload]:
 
 
 def _settles(task: Task) -> bool:
-    """Whether particles settle: under gravity, at walls that take energy at impacts."""
+    """Whether particles settle: under gravity, at walls that take energy in impacts."""
     laws = task.compiled.laws
     return task.scene.gravity is not None and laws is not None and laws.restitution is not None
 
 
 def _sliding(task: Task) -> list[Workload]:
-    """The steps of particles that come to slide."""
+    """The steps of particles that will slide."""
     scene = task.scene
     if scene.gravity is None or not _settles(task):
         return []
     crossing = math.sqrt(scene.finite_size() / math.hypot(*scene.gravity))
     a_second = _STEPS_A_CROSSING / crossing
     if scene.moves() and not scene.reacts():
-        # What rests goes with its wall for so long at a time.
+        # A particle at rest moves with its wall in steps of this time.
         a_second = max(a_second, 1.0 / task.compiled.walls().at(0.0).shortest_time_scale())
     steps = len(task.particles) * task.options.until * a_second
     return [Workload(steps, "steps of sliding at most", _SLIDING)]
 
 
 def _impacts(task: Task) -> float:
-    """The impacts on walls, if particles go on as they fly at the start; 0 if no particle flies."""
+    """The impacts on walls, if particles go on with the flights of the start; 0 if no particle flies."""
     if not task.scene.surfaces or not len(task.particles):
         return 0.0
     if not task.scene.moves():
         between = workload.time_between(task.compiled, task.particles)
     else:
-        # A crossing of the scene at the mean speed, after a fall where there is gravity.
+        # A crossing of the scene at the mean speed, after a fall under gravity.
         between = task.scene.finite_size() / speed if (speed := _speed(task)) > 0.0 else math.inf
     return len(task.particles) * task.options.until / between if 0.0 < between < math.inf else 0.0
 
@@ -318,7 +318,7 @@ def _speed(task: Task) -> float:
 def _collisions(task: Task) -> float:
     """The collisions of balls in a gas: N (N/V) pi d^2 sqrt(2) |v| t / 2, times Enskog's factor.
 
-    That is the one of Carnahan and Starling, in a plane of Henderson.
+    The factor is that of Carnahan and Starling, or in a plane that of Henderson.
     """
     balls, scene = task.particles, task.scene
     assert balls.radius is not None
@@ -346,9 +346,9 @@ def _cost_of_an_impact(task: Task) -> float:
 
 
 def _kernels(task: Task) -> tuple[int, int, bool]:
-    """How many kernels are not compiled yet, how many the run is known to need, and whether it does without at first.
+    """The number of kernels that are not compiled yet, of known kernels of the run, and whether it starts without them.
 
-    (0, 0, False): there are too many particles to look.
+    The result is (0, 0, False) if there are too many particles for this.
     """
     if len(task.particles) > _MOST:
         return 0, 0, False

@@ -26,7 +26,7 @@ from .docstrings import entries_of, first_line, meanings_of, sections_of
 from .keys import Form, Table, tables
 
 _HERE, _PACKAGE = Path(__file__).parent, sys.modules[__package__.partition(".")[0]]
-# A topic and names of it, and names on the next lines, in the docstring of the package.
+# A topic and its names, also on the next lines, in the docstring of the package.
 _TOPIC = re.compile(r"(?m)^ {4}(\S[\w ]*?) {2,}(.*(?:\n {10,}.*)*)")
 _SECTIONS = ("Returns", "Raises", "Conserves", "Order", "Cost", "Source", "Reference")
 _WITH_ENTRIES = ("Args", "Attributes", "Raises")
@@ -36,10 +36,10 @@ class Entry(NamedTuple):
     """An entry of a page, and of the search.
 
     Attributes:
-        anchor: its name, which no other entry of any page has.
-        title: as it is shown.
-        about: one line of what it is.
-        body: HTML.
+        anchor: its name, unique on all pages.
+        title: its title.
+        about: its description in one line.
+        body: its HTML.
     """
 
     anchor: str
@@ -57,7 +57,7 @@ class Section(NamedTuple):
 
 
 def topics() -> dict[str, list[str]]:
-    """The public names by topic, as the docstring of the package has them.
+    """The public names by topic, from the docstring of the package.
 
     >>> topics()["Particles"]
     ['Particles', 'fill', 'pack']
@@ -67,10 +67,10 @@ def topics() -> dict[str, list[str]]:
 
 
 def write(folder: Path, commands: Mapping[str, Any], overwrite: bool = False) -> Path:
-    """Write the pages into a folder, which is made, and return the first page; `commands` are those of click.
+    """Write the pages into a folder, which may be created; return the first page; `commands` are those of click.
 
     Raises:
-        SceneError: the folder is a file, or holds a page that may not be replaced.
+        SceneError: the folder is a file, or has a page that may not be replaced.
         FileError: a page cannot be written.
     """
     target = target_of("folder", folder)
@@ -122,7 +122,7 @@ def _of_name(name: str) -> Entry:
 
 
 def _of_bases(cls: type[Any]) -> str:
-    """The names of the arguments that a class takes besides its own, and where they are described."""
+    """The names of the common arguments of a class, and a link to their description."""
     own = entries_of(sections_of(cls).get("Args", ""))
     taken = [name for name in inspect.signature(cls).parameters if name not in own] if own else []
     common = [name for name in meanings_of(cls) if name in taken]
@@ -158,7 +158,7 @@ def _of_member(owner: str, name: str, value: Any) -> str:
 
 
 def _described(value: Any, owner: str = "") -> str:
-    """The docstring of a value; the arguments of a public name, the `owner`, are found by the search."""
+    """The docstring of a value; with `owner`, a public name, its arguments get anchors for the search."""
     found = sections_of(value)
     body = _prose(found.get("", ""))
     for title in ("Args", "Attributes", *_SECTIONS):
@@ -181,7 +181,7 @@ def _entries(entries: dict[str, str], owner: str = "") -> str:
 
 
 def _prose(text: str) -> str:
-    """Paragraphs; what is indented, and tables, are as they are."""
+    """Paragraphs in HTML; indented blocks and tables stay as they are."""
     made = ""
     for block in re.split(r"\n\s*\n", text):
         if block.strip():
@@ -195,7 +195,7 @@ def _text(text: str) -> str:
 
 
 def _line(text: str) -> str:
-    """A text in HTML, with what is between backquotes as code, and public names as links."""
+    """A text in HTML, with text between backquotes as code, and public names as links."""
     parts = _text(" ".join(text.split())).split("`")
     return "".join(part if k % 2 == 0 else _code(part) for k, part in enumerate(parts))
 
@@ -269,7 +269,7 @@ def form_in_words(form: Form) -> str:
         return f"{name} above {above:g}"
     if least is not None and most is not None and abs(most) < 1e99:
         return f"{name} from {least:g} to {most:g}"
-    # A length is above the smallest number that has a square above 0.
+    # A length is above the smallest number with a positive square.
     return (
         name if least is None or least < 0 else f"{name} above 0" if 0 < least < 1e-9 else f"{name}, {least:g} or more"
     )
@@ -306,7 +306,7 @@ def _of_command(name: str, command: Any) -> Entry:
 
 
 def _of_option(command: str, one: Any) -> str:
-    """The row of an argument or option of click: its names, its default, and what it is."""
+    """The row of an argument or option of click: its names, its default, and its help."""
     if one.param_type_name == "argument":
         names, default = [one.metavar], "needed"
     else:
@@ -320,7 +320,7 @@ def _of_option(command: str, one: Any) -> str:
 
 
 def _found(made: tuple[Section, ...]) -> list[list[str]]:
-    """What the search finds: title, address, and what it is, of entries, and of rows of their tables."""
+    """The entries of the search: title, address, and description of entries, and of rows of their tables."""
     rows = []
     for section in made:
         for one in section.entries:

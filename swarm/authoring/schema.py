@@ -1,4 +1,4 @@
-"""A JSON Schema of scene files, and of sweep files, made of their keys: editors complete and check files with it."""
+"""A JSON Schema of scene files, and of sweep files, made from their keys, for editors that complete and check files."""
 
 from typing import Any
 
@@ -10,14 +10,14 @@ from .keys import CODE, INTEGER, Form, Table, either, listed, named, tables
 
 # JSON Schema, draft 2020-12.
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-# Where user code may stand in place of a kind.
+# Tables of which user code may replace the kind.
 _OWN_KINDS = ("surface", "method")
 # Keys of [particles] that go with a file.
 _OF_FILES = ("from", "frame")
 
 
 def schema_of(sweep: bool = False) -> Form:
-    """The schema of scene files; of sweep files, in which [sweep] may give what other tables lack.
+    """The schema of scene files; in that of sweep files, [sweep] may give keys that other tables lack.
 
     >>> sorted(schema_of()["required"]), sorted(schema_of(sweep=True)["required"])
     (['run'], ['sweep'])
@@ -58,7 +58,7 @@ def schema_of(sweep: bool = False) -> Form:
 
 def _definitions(known: dict[tuple[str, str], Table]) -> Form:
     common = known["surface", ""]
-    # What is no wall may have no other value of these than the default; its rotation is of its place.
+    # A surface that is no wall has the default values of these keys; its rotation is that of its place.
     bare: Form = {
         key.name: {"const": key.default} if isinstance(key.default, float) else False
         for key in common.keys if key.name != "rotation"
@@ -91,7 +91,7 @@ def _definitions(known: dict[tuple[str, str], Table]) -> Form:
 
 
 def _one_of(known: dict[tuple[str, str], Table], place: str) -> Form:
-    """The form of a table of one of its kinds, or of user code."""
+    """The form of a table of a kind of `place`, or of user code."""
     kinds = [named(f"{place}.{kind}") for at, kind in known if at == place and kind]
     return {"type": "object", "oneOf": [*kinds, *([_own("kind")] if place in _OWN_KINDS else [])]}
 
@@ -101,7 +101,7 @@ def _own(key: str) -> Form:
 
 
 def _properties(table: Table) -> Form:
-    """The forms of keys, with what is said of them."""
+    """The forms of keys, with their meanings."""
     kinds = {"kind": {"const": table.kind, "description": table.meaning}} if table.kind else {}
     meanings = {key.name: {**key.form, **({"description": key.meaning} if key.meaning else {})} for key in table.keys}
     return kinds | meanings
@@ -118,7 +118,7 @@ def _only(properties: Form, *needed: str) -> Form:
 
 
 def _surface(kind: str, table: Table) -> Form:
-    """A kind of surface: its own keys and those of all; what may come from a file is not needed beside it."""
+    """A kind of surface: its own keys and the common ones; a key that may come from a file is not needed with one."""
     cls = ALL_SURFACES[kind]
     needed = [key.name for key in table.keys if key.needed]
     needs: Form = {"required": ["kind", *needed]}
@@ -172,7 +172,7 @@ _ENDS: Form = {"type": "array", "prefixItems": [{"type": "number"}, {"type": "nu
 
 
 def _without_needs(form: Any) -> Any:
-    """A form that does not need any key: of several kinds the first that fits is enough."""
+    """A form that needs no key: of several kinds the first that fits is enough."""
     if isinstance(form, list):
         return [_without_needs(one) for one in form]
     if not isinstance(form, dict):

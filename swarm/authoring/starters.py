@@ -22,6 +22,6 @@ def text_of(kind: str) -> str:
 
 
 def begin(kind: str, path: Path | None = None) -> Path:
-    """Write a scene file to begin with, KIND.toml in the current folder or another new file; its path."""
+    """Write a scene file to begin with, KIND.toml in the current folder or another new file; return its path."""
     text = text_of(kind)
     return marks.write(Path(f"{kind}.toml") if path is None else path, text.encode(), "scene file")

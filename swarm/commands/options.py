@@ -1,4 +1,4 @@
-"""Commands made of functions: a parameter is annotated with its type, its names on the command line, and its help."""
+"""Commands made from functions: a parameter is annotated with its type, its command-line names, and its help."""
 
 import inspect
 from collections.abc import Callable
@@ -11,13 +11,13 @@ _INTERRUPTED = 130
 
 
 class Option:
-    """An option with these names; without any, its name is that of the parameter."""
+    """An option with these names, or with the name of its parameter."""
 
     def __init__(self, *names: str, **more: Any) -> None:
         self.names, self.more = names, more
 
     def parameter(self, name: str, kind: Any, default: Any) -> click.Parameter:
-        """The option of click for a parameter of a function; required if the parameter has no default."""
+        """Return the option of click for a parameter of a function; required if the parameter has no default."""
         more = {"required": True} if default is inspect.Parameter.empty else {"default": default}
         more |= {"is_flag": True} if kind is bool else {"type": _type_of(kind), "multiple": kind == list[str]}
         return click.Option([*(self.names or [f"--{name}"]), name], **more, **self.more)
@@ -30,7 +30,7 @@ class Positional:
         self.metavar, self.help = metavar, help
 
     def parameter(self, name: str, kind: Any, default: Any) -> click.Parameter:
-        """The argument of click for a parameter of a function."""
+        """Return the argument of click for a parameter of a function."""
         return click.Argument([name], type=_type_of(kind), metavar=self.metavar, help=self.help)
 
 
@@ -39,7 +39,7 @@ def _type_of(kind: Any) -> Any:
 
 
 class _Interruptible(click.Command):
-    """A command that ends with the exit code 130 at an interrupt, as a shell expects."""
+    """A command that ends with the exit code 130 after an interrupt, as a shell expects."""
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
@@ -49,14 +49,14 @@ class _Interruptible(click.Command):
 
 
 class Group(click.Group):
-    """Commands in the order in which they are added."""
+    """Commands, listed in the order of their addition."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """The names of the commands."""
+        """Return the names of the commands."""
         return list(self.commands)
 
     def add(self, function: Callable[..., None], epilog: str, short_help: str | None = None) -> None:
-        """Add the command that has the name, the parameters and the docstring of a function."""
+        """Add the command with the name, the parameters and the docstring of a function."""
         parameters = []
         for name, one in inspect.signature(function).parameters.items():
             kind, given = get_args(one.annotation)

@@ -110,7 +110,7 @@ def animate(
 
 
 def _picture(output: Path, source: Path, overwrite: bool) -> Path:
-    """The file that a picture becomes; a SceneError if it cannot."""
+    """Return the file of a picture; raise a SceneError if it cannot be written there."""
     from ..files.marks import check_target
     from ..files.paths import check_distinct, target_of
 
@@ -123,7 +123,7 @@ def _picture(output: Path, source: Path, overwrite: bool) -> Path:
 
 
 def _numbers(name: str, text: str) -> list[float]:
-    """Comma-separated numbers."""
+    """Return the numbers of a comma-separated text."""
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:

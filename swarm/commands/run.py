@@ -14,7 +14,7 @@ from ..errors import CompleteError, SceneError, SwarmError, WallTimeError
 from .options import Option, Positional
 from .shown import EXIT_CODES, REASONS, Cluster, Plugins, Quiet, Walltime, command_again, table
 
-# Follows the reason why a run has stopped.
+# The end of the reason for which a run has stopped.
 _COMPILED = ", after a compilation that was under way"
 
 
@@ -85,7 +85,7 @@ def run(  # noqa: PLR0913  one argument an option
                 cluster=cluster,
                 shards=shards,
             )
-            # Outputs are checked before particles are made and kernels compiled.
+            # Outputs are checked before particles are generated and kernels compiled.
             allow = "overwrite it by naming it on the command line: {} --overwrite"
             check_outputs(
                 job, options, alone, allow, {name: f"{option} {{}}" for name, option in files.OUTPUTS.items()}
@@ -121,7 +121,7 @@ def run(  # noqa: PLR0913  one argument an option
 
 
 def _stopped(reason: str, target: Path, has_frames: bool, on_cluster: bool) -> str | None:
-    """Print how to resume a run that was stopped. Returns that command, or None if it cannot be resumed."""
+    """Print how to resume a run that was stopped; return that command, or None if it cannot be resumed."""
     from ..files import paths
 
     if not (has_frames or (on_cluster and paths.checkpoint_of(target).exists())):

@@ -1,4 +1,4 @@
-"""What several commands share: arguments, output, and the command that resumes a run."""
+"""The common parts of several commands: arguments, output, and the command that resumes a run."""
 
 import itertools
 import shlex
@@ -21,19 +21,19 @@ Cluster = Annotated[
 ]
 Quiet = Annotated[bool, Option("--quiet", help="No progress bar and no summary.")]
 
-# Exit codes of runs that are stopped. 130 is that of a shell for SIGINT. 75 is EX_TEMPFAIL of sysexits.h, "try again
-# later": the wall time is over, and a chain of jobs needs another one.
+# Exit codes of stopped runs. 130 is that of a shell for SIGINT. 75 is EX_TEMPFAIL of sysexits.h, "try again
+# later": the wall time is over, and a chain of jobs needs another job.
 EXIT_CODES = {"interrupted": 130, "walltime": 75}
 REASONS = {"interrupted": "interrupted", "walltime": "the wall time limit is reached"}
 
 
 def written(path: Path) -> None:
-    """Print the path and the size of a file that was written."""
+    """Print the path and the size of a written file."""
     print(f"written to {path} ({path.stat().st_size / 1e6:.1f} MB)")
 
 
 def command_again() -> str:
-    """The command line that resumes this run: this one with --resume, without the options that do not go with it."""
+    """The command line that resumes this run: this one with --resume, without options that contradict it."""
     again = [
         word
         for before, word in itertools.pairwise(["", *sys.argv[1:]])

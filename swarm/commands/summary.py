@@ -12,7 +12,7 @@ from ..words import facts
 from ..words.amounts import amount
 from ..words.unfinished import unfinished
 
-# Of these JSON has the value at the end, or the largest.
+# Observables of which JSON has the value at the end, or the largest value.
 _OF_BALLS = ("collisions", "largest_overlap")
 _OUTCOME = (
     "impacts", *_OF_BALLS, "energy_error", "max_penetration", "dissipated_energy", "link_error", "work", "wall_heat",
@@ -22,7 +22,7 @@ _OUTCOME = (
 
 
 def numbers(trajectory: Path) -> dict[str, Any]:
-    """A run's summary from its trajectory, which holds at least one frame, in the types of JSON."""
+    """The summary of a run from its trajectory, which has at least one frame, in the types of JSON."""
     from ..files.trajectory import load
 
     with load(trajectory) as written:
@@ -49,7 +49,7 @@ def _at_the_end(seen: dict[str, Any], name: str) -> Any:
 def of_file(file: Path) -> dict[str, str]:
     """The content of an HDF5 file, a trajectory or a log of impacts, and whether all values match their checksums.
 
-    Of a run that goes on or was cut the first row says so.
+    If the run goes on or was cut off, the first row says so.
     """
     from ..files.impact_log import load_impacts
     from ..files.stored import is_log

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..fleet.sweeping import Outcome
 
 _FAILED = 1
-# So many failures are printed; the table has all.
+# The largest number of failures that are printed; the table has all.
 _SHOWN = 5
 
 
@@ -45,7 +45,7 @@ def sweep(  # noqa: PLR0913  one argument an option
     """Carry out the runs of a sweep file, and write one table of their results."""
     first, interrupts = None, list[bool]()
     try:
-        # Not at once: the process that has started is to end first.
+        # An interrupt here waits: the process that has started must end first.
         with interrupt.taken_by(lambda: interrupts.append(True)), interrupt.importing():
             if cluster is None:
                 from ..fleet.processes import Place

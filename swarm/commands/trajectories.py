@@ -1,4 +1,4 @@
-"""`swarm info` and `swarm export`: what files hold, and trajectories for other programs."""
+"""`swarm info` and `swarm export`: the content of files, and trajectories for other programs."""
 
 import sys
 from pathlib import Path
@@ -8,7 +8,7 @@ from ..errors import SceneError
 from .options import Option, Positional
 from .shown import TrajectoryFile, table, written
 
-# More files than this are printed as a range.
+# A larger number of files is printed as a range.
 _FEW = 2
 
 
@@ -70,7 +70,7 @@ def export(
 
 
 def _frames(text: str) -> slice | int:
-    """The number, or the slice of Python, that a text such as -1 or 2:10:4 stands for."""
+    """Return the number, or the slice of Python, of a text such as -1 or 2:10:4."""
     try:
         parts = [int(part) if part.strip() else None for part in text.split(":")]
         if len(parts) == 1 and parts[0] is not None:

@@ -2,7 +2,7 @@
 
 .vtkhdf (vtkhdf.py) for ParaView and VTK, .xyz (xyz.py) for OVITO and ASE, .gsd (gsd.py) for HOOMD-blue and freud, .ply
 (ply.py), a file a frame, for Blender and games, .csv (spreadsheet.py) for spreadsheets and pandas; .obj (obj.py) has
-the walls at one frame. A frame is in memory at a time. 10 000 particles and 500 frames take, read and written, 0.9 s of
+the walls at one frame. It holds one frame in memory. 10 000 particles and 500 frames take, read and written, 0.9 s of
 one core and 280 MB as .vtkhdf, 5.5 s and 660 MB as .xyz, 1.1 s and 200 MB as .gsd, 1.2 s and 195 MB as .ply, 7.6 s and
 710 MB as .csv.
 """
@@ -19,11 +19,11 @@ from ..files.replaced import together
 from ..triangles.solids import is_many
 from .exported import Exported, Progress, numbers_of
 
-# The modules that write them.
+# The modules of the formats.
 _FORMS = {
     ".vtkhdf": "vtkhdf", ".xyz": "xyz", ".gsd": "gsd", ".ply": "ply", ".csv": "spreadsheet", ".obj": "obj",
 }  # fmt: skip
-# Files of particles and of walls; there may be one of solids.
+# The number of files of particles and of walls; there may be another one of solids.
 _WITH_WALLS = 2
 SUFFIXES = tuple(_FORMS)
 
@@ -49,7 +49,7 @@ def export(
         (number,) = numbers_of(frames or 0, len(trajectory))
     else:
         chosen = Exported(trajectory, frames, particles, progress)
-    # What is missing is found before anything is written.
+    # Missing packages are found before the first file is written.
     with needed_by(f"an export as {kind}", "gsd" if kind == ".gsd" else "plot"):
         form = importlib.import_module(f".{_FORMS[kind]}", __package__)
     targets, stale = [target], list[Path]()
@@ -92,7 +92,7 @@ def _write(form: Any, chosen: Exported, parts: list[Path]) -> None:
 
 
 def _require_walls(trajectory: Any, frames: slice | int | None, particles: int, surfaces: bool) -> None:
-    """Raise a `SceneError` if what is asked of an .obj is not the walls at one frame."""
+    """Raise a `SceneError` if the arguments for an .obj are not those of the walls at one frame."""
     if not surfaces or particles != 1:
         got = "surfaces=False (--no-surfaces)" if not surfaces else f"particles={particles!r}"
         raise SceneError(f"export: an .obj has the walls, and no particles; leave out {got}, or write another format")

@@ -1,4 +1,4 @@
-"""The part of a trajectory that is exported: some of its frames, and some of its particles or bodies."""
+"""The exported part of a trajectory: a selection of its frames, and of its particles or bodies."""
 
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ from ..common import checks
 from ..errors import SceneError
 from ..files.stored import whole
 
-# A function of the number of frames that are written and of the number of all frames to write.
+# A function of the number of written frames and of the number of all frames to write.
 Progress = Callable[[int, int], None]
 
 
@@ -22,8 +22,8 @@ class ExportedFrame(NamedTuple):
     time: float  # [s]
     position: NDArray[Any]  # (n, 3) [m]
     velocity: NDArray[Any]  # (n, 3) [m/s]
-    # Further columns by their names, (n,) or (n, 3): "impacts"; where there are some, "image", "escape_time",
-    # "absorbed_time"; of balls "collisions" and "spin".
+    # Further columns by their names, (n,) or (n, 3): "impacts"; if the file has them "image", "escape_time",
+    # "absorbed_time"; for balls "collisions" and "spin".
     more: dict[str, NDArray[Any]]
     ids: NDArray[np.int64]  # (n,) numbers of the particles
     mass: NDArray[np.float64]  # (n,) [kg]
@@ -34,18 +34,18 @@ class Exported:
     """The chosen frames and particles of a trajectory.
 
     Attributes:
-        trajectory: what is exported.
-        numbers, times: of the frames, times in [s].
-        ids: (n,) numbers of the particles; mass: (n,) [kg]; radius: (n,) of balls [m], else None.
-        bonds: (B, 2) rows that are tied, of bodies.
-        periods: the lengths of the cell, 0 along directions in which it does not repeat.
+        trajectory: the trajectory that is exported.
+        numbers, times: the numbers of the frames, and their times [s].
+        ids: (n,) numbers of the particles; mass: (n,) [kg]; radius: (n,) for balls [m], else None.
+        bonds: (B, 2) pairs of tied rows, for bodies.
+        periods: the lengths of the cell, 0 in directions without a period.
     """
 
     def __init__(self, trajectory: Any, frames: slice | int | None, particles: int, progress: Progress | None) -> None:
-        """Choose: `frames` is a slice or one number, `particles` k is every k-th particle or body.
+        """Choose frames by a slice or one number, and every k-th particle or body by `particles` = k.
 
         Raises:
-            SceneError: there is no such frame, or the file keeps no particles.
+            SceneError: a frame does not exist, or the file keeps no particles.
         """
         self.trajectory, self._progress = trajectory, progress
         trajectory.require_frames()
@@ -64,18 +64,18 @@ class Exported:
         self.periods = np.array([length or 0.0 for length in trajectory.scene.period or (None,) * 3])
 
     def __len__(self) -> int:
-        """Number of particles of the frame with the most."""
+        """Number of particles of the largest frame."""
         return len(self.ids)
 
     @property
     def counts(self) -> list[int]:
-        """The number of particles of each frame: those that come during the run are the last, in this order."""
+        """The number of particles of each frame; particles that come during the run are the last, in this order."""
         if not self.trajectory.has_births():
             return [len(self)] * len(self.numbers)
         return [int(self.trajectory.born(k)[self._rows].sum()) for k in self.numbers]
 
     def moments(self) -> Iterator[ExportedFrame]:
-        """The frames one after the other, each of which is written when the next is asked for.
+        """Yield the frames one after the other; each is written when the next is requested.
 
         Particles that are not yet born in a run with sources are left out.
         """
@@ -92,9 +92,9 @@ class Exported:
 
 
 def lines_of(columns: Iterable[NDArray[Any]], begin: bytes, between: bytes, missing: bytes = b"") -> bytes:
-    """Columns (n,) or (n, 3) as text, a line a row; numbers have the digits that give the same bits again.
+    """Columns (n,) or (n, 3) as text, a line a row; numbers have enough digits for the same bits.
 
-    A writer of JSON is three times as fast as formatting by Python: [[1.5,2],[...]]. It has null for a NaN.
+    A writer of JSON is three times as fast as formatting by Python: [[1.5,2],[...]]. It writes null for a NaN.
     """
     numbers = [part for column in columns for part in np.atleast_2d(column.T).tolist()]
     rows = msgspec.json.encode(list(zip(*numbers, strict=True)))[2:-2].replace(b"null", missing)
@@ -103,7 +103,7 @@ def lines_of(columns: Iterable[NDArray[Any]], begin: bytes, between: bytes, miss
 
 
 def numbers_of(frames: slice | int | None, n: int) -> range:
-    """The numbers of the chosen ones of n frames."""
+    """The numbers of the chosen frames among n."""
     if frames is None:
         return range(n)
     if isinstance(frames, slice):
@@ -125,6 +125,6 @@ def numbers_of(frames: slice | int | None, n: int) -> range:
 
 
 def _among(ids: NDArray[np.int64], bonds: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The pairs of particles, of which both are exported, as rows."""
+    """The pairs of particles of which both are exported, as rows."""
     rows = np.searchsorted(ids, bonds).clip(max=len(ids) - 1)
     return np.asarray(rows[(ids[rows] == bonds).all(axis=1)])

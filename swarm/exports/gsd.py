@@ -1,11 +1,11 @@
 """GSD files in the schema of HOOMD-blue, by its library: particles, masses, images, and bonds of bodies.
 
-Its numbers are float32, and its box is around the origin. Where the scene repeats, that is its cell: positions are less
-the center of the cell, which is log/center. In a direction in which it does not, the box is as wide as the scene, or as
-the particles need, and nothing is shifted but a scene that is far from the origin; its center is log/center too. The
-schema has no box that does not repeat. Frames have the step number, and log/time [s], log/particles/id,
-log/particles/impacts, and log/particles/escape_time where there are openings, absorbed_time
-where walls absorb; balls have diameters, log/particles/collisions, and log/particles/spin where they turn. Images are
+Its numbers are float32, and its box is around the origin. In a periodic scene that is the cell: positions are relative
+to its center, which is log/center. In a direction without a period the box is as wide as the scene, or as
+the particles need, and only a scene far from the origin is shifted, by its center, log/center too. The
+schema has no box without periods. Frames have the step number, and log/time [s], log/particles/id,
+log/particles/impacts, with openings log/particles/escape_time, with absorbing walls absorbed_time;
+balls have diameters, log/particles/collisions, and log/particles/spin if they turn. Images are
 int32.
 """
 
@@ -28,7 +28,7 @@ def write(chosen: Exported, path: Path) -> None:
     repeats = chosen.periods > 0.0
     center[repeats] = 0.5 * (low[repeats] + high[repeats])
     needed = np.where(np.isfinite(high - low), 2.0 * np.maximum(abs(low - center), abs(high - center)), 0.0)
-    # Of a file that is there its library keeps the permissions; a new one would not be readable for all.
+    # The library keeps the permissions of an existing file; a new one would not be readable for all.
     path.touch()
     with gsd.hoomd.open(str(path), "w") as file:
         for moment in chosen.moments():
@@ -41,7 +41,7 @@ def _frame(
     n, bonds = len(moment.ids), chosen.bonds
     position = (moment.position - center).astype(np.float32)
     edges = np.maximum(needed, 2.0 * abs(position).max(axis=0, initial=0.0)).astype(np.float32)
-    # Particles that have no room in a direction, as in a plane, get some.
+    # A direction in which particles have no extent, as in a plane, gets some.
     edges[edges == 0.0] = edges.max() or 1.0
     edges = np.where(chosen.periods > 0.0, chosen.periods.astype(np.float32), edges)
     frame = gsd.hoomd.Frame()
@@ -49,7 +49,7 @@ def _frame(
     frame.configuration.box = [*edges, 0.0, 0.0, 0.0]
     of = frame.particles
     of.N, of.types, of.typeid = n, ["A"], np.zeros(n, np.uint32)
-    # Rounded to float32 what is at the edge of the cell may be beyond it.
+    # A position at the edge of the cell may be rounded to float32 beyond it.
     of.position, of.velocity = position.clip(-0.5 * edges, 0.5 * edges), moment.velocity.astype(np.float32)
     of.mass = moment.mass.astype(np.float32)
     if moment.radius is not None:
@@ -65,7 +65,7 @@ def _frame(
 
 
 def _in_32_bits(images: NDArray[np.int64], number: int) -> NDArray[np.int32]:
-    """Images as the schema keeps them, which has no others."""
+    """Convert images to int32, the only type of the schema."""
     most = int(np.abs(images).max(initial=0))
     if most > np.iinfo(np.int32).max:
         raise SceneError(

@@ -11,7 +11,7 @@ from ..common.catalog import OBSERVABLES
 from ..files import layout
 from ..words.named import name_of, names_of_parts
 
-# Of what the file keeps of each particle: its name in the Dataset and its unit. "impacts" are those of all.
+# The columns of particles in the file: the name in the Dataset and the unit. "impacts" are those of all particles.
 _PARTICLES = {
     "position": ("position", "m"),
     "velocity": ("velocity", "m s-1"),
@@ -26,7 +26,7 @@ _AXES = ("x", "y", "z")
 
 
 class _Column(BackendArray):  # type: ignore[misc]
-    """A dataset of the file as an array that reads what is asked for: complete frames only."""
+    """A dataset of the file as an array that reads only the requested part, of complete frames."""
 
     def __init__(self, trajectory: Any, name: str) -> None:
         self._trajectory, self._name = trajectory, name
@@ -39,7 +39,7 @@ class _Column(BackendArray):  # type: ignore[misc]
         return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER_1VECTOR, self._read)
 
     def _read(self, key: Any) -> Any:
-        # A slice without an end would reach frames that are not complete.
+        # A slice without an end would reach incomplete frames.
         first = key[0]
         if isinstance(first, slice):
             first = slice(*first.indices(self.shape[0]))

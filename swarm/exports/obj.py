@@ -1,6 +1,6 @@
 """Wavefront OBJ: the walls at one frame, each surface an object of its own, for Blender, game engines and CAD.
 
-Corners have all digits, in [m]. The triangles of an object face out of what it encloses, as programs of CAD have it:
+Corners have all digits, in [m]. The triangles of an object face out of the enclosed volume, as in CAD programs:
 those of a cavity away from the particles, those of a solid towards them. The materials `cavity`, which is translucent,
 and `solid` are in the .mtl file beside it. Surfaces of more than 20 000 bodies are left out, which a comment says.
 """
@@ -21,9 +21,9 @@ from ..triangles.shape import Shape
 from ..triangles.shapes import shapes_of
 from .exported import lines_of
 
-# Bodies of one surface that are drawn: each has some 200 vertices.
+# The largest number of drawn bodies of one surface: each has about 200 vertices.
 _MOST = 20_000
-# How far beside a triangle it is asked on which side of it the particles are, of its size.
+# The distance beside a triangle, relative to its size, at which the side of the particles is determined.
 _BESIDE = 1e-3
 _OPACITY = {"cavity": 0.3, "solid": 1.0}
 
@@ -56,9 +56,9 @@ def write_objects(trajectory: Any, number: int, path: Path, materials: Path) -> 
 
 
 def walls_at(trajectory: Any, number: int, time: float) -> list[Shape]:
-    """The walls at a frame, where they are then, if they are there; their triangles face outwards."""
+    """The walls that are present at a frame, at their places; their triangles face outwards."""
     scene = trajectory.scene
-    # Where impacts have moved them is known from the file alone.
+    # The file alone tells where impacts have moved them.
     scene = scene.at_frame(trajectory.observables, number) if scene.reacts() else scene
     positions = trajectory.frame(number).position if trajectory.has_particles() else np.zeros((3, 1))
     drawn = shapes_of(scene, positions, time, most=_MOST)
@@ -66,7 +66,7 @@ def walls_at(trajectory: Any, number: int, time: float) -> list[Shape]:
 
 
 def outwards(scene: Scene, shape: Shape, time: float) -> NDArray[np.int64]:
-    """The triangles of a shape, turned so that those of a cavity face away from the particles, of a solid to them."""
+    """The triangles of a shape, turned so that a cavity's face away from particles and a solid's face them."""
     if not len(shape.triangles):
         return shape.triangles
     a, b, c = (shape.vertices[shape.triangles[:, k]] for k in range(3))
@@ -77,7 +77,7 @@ def outwards(scene: Scene, shape: Shape, time: float) -> NDArray[np.int64]:
     with np.errstate(all="ignore"):
         ahead, behind = (_gap(scene, shape.surface, place, time) for place in (middles + steps, middles - steps))
         rises = np.nan_to_num((ahead - behind) / size[:, 0], posinf=0.0, neginf=0.0)
-    # Slivers, of which round-off decides, face as most do.
+    # Slivers, with orientations determined by round-off, face as most triangles do.
     clear = abs(rises) > 0.1 * np.median(abs(rises))
     sign = np.where(clear, np.sign(rises), np.sign(np.sign(rises).sum()))
     return np.where((sign < 0.0)[:, None] ^ shape.solid, shape.triangles[:, ::-1], shape.triangles)

@@ -1,11 +1,11 @@
-"""PLY files, a file a frame: of Blender, MeshLab, Open3D, trimesh and game engines; binary, little-endian.
+"""PLY files, one a frame, for Blender, MeshLab, Open3D, trimesh and game engines; binary, little-endian.
 
-Vertices have x, y, z, vx, vy, vz, speed, mass and, of balls, radius as float, with seven digits, which is what most
-readers keep of whatever they get; red, green, blue as in pictures; and `particle`, its number, since Blender takes no
-`id`. Where there are openings they have escaped, and where walls absorb absorbed, 0 or 1; those that come later in a
+Vertices have x, y, z, vx, vy, vz, speed, mass and, for balls, radius as float, with seven digits, which most
+readers keep of any number; red, green, blue as in pictures; and `particle`, its number, since Blender accepts no
+`id`. With openings they have escaped, and with absorbing walls absorbed, 0 or 1; particles that come later in a
 run are left out. Points of bodies have the number of their `body`: one with faces has its contact points as vertices,
-without a mass, and its triangles as faces, another one its bonds as edges. Comments say the time, the number of the
-frame, what the colours mean and, of a scene that is far from the origin, the center that positions are less. The walls
+without a mass, and its triangles as faces, another one its bonds as edges. Comments have the time, the number of the
+frame, the meaning of colours and, in a scene far from the origin, the center that positions are relative to. The walls
 are written as .obj (obj.py). Read by Blender 4.5.
 """
 
@@ -23,7 +23,7 @@ from ..state import Floats
 from .exported import Exported, ExportedFrame
 
 _KINDS = {"f4": "float", "u1": "uchar", "i4": "int"}
-# A face is written as the number of its corners, and these.
+# A face is written as the number of its corners, and their indices.
 _FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
 _EDGE = np.dtype([("vertex1", "<i4"), ("vertex2", "<i4")])
 _BEGIN = b"ply\nformat binary_little_endian 1.0\ncomment swarm"
@@ -32,7 +32,7 @@ _DIGITS = 4
 
 
 def names_of(target: Path, count: int) -> list[Path]:
-    """The names of so many files: `target` itself for one, else OUT_0000.ply and so on."""
+    """The names of `count` files: `target` itself for one, else OUT_0000.ply and so on."""
     if count == 1:
         return [target]
     digits = max(_DIGITS, len(str(count - 1)))
@@ -40,12 +40,12 @@ def names_of(target: Path, count: int) -> list[Path]:
 
 
 def older(target: Path) -> list[Path]:
-    """The files of a sequence that was written as `target` before."""
+    """The files of an earlier sequence with the name `target`."""
     found = []
     for path in sorted(target.parent.glob(f"{glob.escape(target.stem)}_*{glob.escape(target.suffix)}")):
         digits = path.stem[len(target.stem) + 1 :]
         if digits.isdecimal() and len(digits) >= _DIGITS:
-            # What others have named so stays.
+            # Files of other programs with such names stay.
             with open(path, "rb") as file:
                 if file.read(len(_BEGIN)) == _BEGIN:
                     found.append(path)
@@ -62,7 +62,7 @@ def write_sequence(chosen: Exported, files: list[Path]) -> None:
 
 
 class _PlyWriter:
-    """What is the same in all files."""
+    """A writer with the common data of all files."""
 
     def __init__(self, chosen: Exported) -> None:
         trajectory, self._chosen = chosen.trajectory, chosen
@@ -141,7 +141,7 @@ def _contacts(contacts: Floats, rows: Floats, copies: int) -> Floats:
 
 
 def _named(columns: dict[str, Any]) -> dict[str, tuple[str, Any]]:
-    """Each property by its name, with its kind of number."""
+    """The columns by property, each with the type of its numbers."""
     found: dict[str, tuple[str, Any]] = {}
     for name, values in columns.items():
         parts = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "colour": ("red", "green", "blue")}

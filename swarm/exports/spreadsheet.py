@@ -1,9 +1,9 @@
-"""CSV: a line a particle and frame, for spreadsheets, pandas and R, with the digits that give the same bits again.
+"""CSV: a line a particle and frame, for spreadsheets, pandas and R, with enough digits for the same bits.
 
-The first line has the names, plain ones, of the columns, so that every program reads the file unaided: frame, time [s],
-id, x, y, z [m], vx, vy, vz [m/s], mass [kg], of balls radius [m], where they turn wx, wy, wz [rad/s], then impacts and
-what else there is; of points of bodies also body, its number. A cell is empty where there is no number, such as
-the escape time of a particle that is inside. A file of one frame is a start: `from = "start.csv"`,
+The first line has the plain names of the columns, so that every program reads the file unaided: frame, time [s],
+id, x, y, z [m], vx, vy, vz [m/s], mass [kg], for balls radius [m], if they turn wx, wy, wz [rad/s], then impacts and
+further columns; for points of bodies also body, its number. A cell without a value is empty, such as
+the escape time of a particle inside. A file of one frame can be a start: `from = "start.csv"`,
 `Particles.from_csv`.
 """
 
@@ -12,7 +12,7 @@ from typing import Any
 
 from .exported import Exported, lines_of
 
-# Columns of vectors, by their names; of others the names of the components are NAME_x, NAME_y, NAME_z.
+# The columns of vectors by name; other vectors have the columns NAME_x, NAME_y, NAME_z.
 _VECTORS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "spin": ("wx", "wy", "wz")}
 
 

@@ -1,7 +1,7 @@
 """VTKHDF, the HDF5 format of VTK and ParaView: particles of all frames as one PolyData that changes in time.
 
 https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/vtkhdf_specifications.html: the points of all steps
-follow one another, and Steps says where those of each begin; what does not change is there once. Read by VTK 9.3 and
+follow one another, and Steps has the first one of each; constant data are stored once. Read by VTK 9.3 and
 9.7; ParaView was not tried. The walls are a file of their own (walls.py): blocks of one file need VTK 9.4; its reader
 fails if steps are also at its root, while that of VTK 9.7 shows the first step for ever if they are not.
 """
@@ -18,21 +18,21 @@ from numpy.typing import NDArray
 from .exported import Exported
 
 VERSION = (2, 0)
-# In the order of the columns of CellOffsets and ConnectivityIdOffsets.
+# The order of the columns of CellOffsets and ConnectivityIdOffsets.
 CELLS = ("Vertices", "Lines", "Polygons", "Strips")
-# Digits of a number that a user types, and how far a multiple of it may be from the nearest float, in units in the
-# last place.
+# Digits of a number that a user types, and the largest distance of a multiple of it from the nearest float, in units
+# in the last place.
 _DIGITS, _ROUND_OFF = 12, 4.0
 
 
 def write(chosen: Exported, path: Path) -> None:
-    """Write the particles that are there; bonds of bodies are lines."""
+    """Write the present particles; bonds of bodies are lines."""
     n, frames, counts = len(chosen), len(chosen.numbers), chosen.counts
     firsts = np.cumsum([0, *counts])
-    # Where particles come each step has a part of its own. Those that are there come first, so the parts share what
-    # does not change, and their cells.
+    # If particles come, each step has a part of its own. Present particles are the first ones, so the parts share
+    # constant data and cells.
     parts = counts if len(set(counts)) > 1 else counts[:1]
-    # Of balls any may be there: a birth that is blocked comes later than others, or never.
+    # Any of the balls may be present: a blocked birth comes later than others, or never.
     feeds = chosen.radius is not None and chosen.trajectory.has_births()
     with h5py.File(path, "w") as file:
         root = begin(file, {"Vertices": np.arange(n)[:, None], "Lines": chosen.bonds}, parts)
@@ -55,10 +55,10 @@ def write(chosen: Exported, path: Path) -> None:
 
 
 def begin(file: h5py.File, cells: dict[str, Any], parts: Sequence[int]) -> Any:
-    """The root of a PolyData with these cells, rows of as many points as each has, in parts of so many points each.
+    """Create the root of a PolyData with these cells, each a row of points, in parts with these numbers of points.
 
-    If there is more than one part, each has the first of the vertices, one a point. Of other cells all parts have the
-    same ones, or those of its own where they are a list with an array for each part.
+    If there is more than one part, each has the first of the vertices, one a point. Other cells are the same in all
+    parts, or a list with an array for each part.
     """
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array(VERSION)
@@ -74,18 +74,18 @@ def begin(file: h5py.File, cells: dict[str, Any], parts: Sequence[int]) -> Any:
             each, most = np.array(parts) if is_first else np.full(len(parts), len(rows)), len(rows)
         root[f"{name}/NumberOfCells"], root[f"{name}/NumberOfConnectivityIds"] = each, rows.shape[1] * each
         root[f"{name}/Connectivity"] = rows.astype(np.int64).ravel()
-        # Those of the part with the most cells, which all others share: a step begins at the first.
+        # The offsets of the part with the most cells, which all parts share: a step begins at the first.
         root[f"{name}/Offsets"] = rows.shape[1] * np.arange(most + 1)
     return root
 
 
 def timed(root: Any, chosen: Exported, firsts: NDArray[np.int64]) -> Any:
-    """Its steps, each with the place of its first point, and with a part of its own if there is more than one."""
+    """Create the steps, each with the index of its first point, and with a part of its own if there are several."""
     frames = len(chosen.numbers)
     steps = root.create_group("Steps")
     steps.attrs["NSteps"] = frames
     steps["Values"] = [as_typed(time) for time in chosen.times.tolist()]
-    # With one part for all steps VTK 9.3 does not look for cells of others behind its own.
+    # If all steps have one part, VTK 9.3 does not look for cells of other parts behind it.
     several = len(root["NumberOfPoints"]) > 1
     steps["PartOffsets"] = np.arange(frames) if several else np.zeros(frames, np.int64)
     steps["NumberOfParts"] = np.ones(frames, np.int64)
@@ -96,7 +96,7 @@ def timed(root: Any, chosen: Exported, firsts: NDArray[np.int64]) -> Any:
 
 
 def as_typed(time: float) -> float:
-    """The decimal of few digits that a time is but for round-off, if it has few: of frame 3 at every 0.1 s it is 0.3.
+    """The decimal of few digits that equals a time but for round-off, or the time: 0.3 for frame 3 at every 0.1 s.
 
     Programs look for the last step at or before a time that a user types, and 0.30000000000000004 is after it.
 

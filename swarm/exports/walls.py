@@ -1,12 +1,12 @@
-"""The walls of a trajectory as VTKHDF: triangles, and the solids of large fields, at rest or where they are in a frame.
+"""The walls of a trajectory as VTKHDF: triangles, and the solids of large fields, at rest or moved in each frame.
 
-Cells of triangles have the data "surface", the place in `scene.surfaces`, and "solid", 1 where particles are kept out
-of it; where there are unions also "part", the number of the part among those of all of them, or -1. Of a run with
+Cells of triangles have the data "surface", the index in `scene.surfaces`, and "solid", 1 if particles are kept
+outside; with unions also "part", the number of the part among all parts, or -1. In a run with
 `member_impacts` they have "impacts", "residence" [s], "heat" [J] and "absorbed" of their member until the frame: of the
-triangle of a mesh, the solid of a field, the part of a union, or the surface; NaN where that is a side of an outline.
+triangle of a mesh, the solid of a field, the part of a union, or the surface; NaN for a side of an outline.
 
 The solids of fields of more than 2000 are points of a file of their own: with "surface", "kind" (0 spheres, 1 boxes,
-2 cylinders, 3 capsules, 4 ellipsoids), "radius" [m] of what has one, "halves", half of the extent along their axes
+2 cylinders, 3 capsules, 4 ellipsoids), "radius" [m] if it has one, "halves", half of the extent along its axes
 [m], and "orientation", a quaternion (w, x, y, z). ParaView draws spheres as Point Gaussian, or by Glyph of a Sphere of
 radius 1 that is scaled by "radius". It draws others by Glyph of a Box, Cylinder or Sphere of half widths 1 that is
 scaled by "halves" and turned by "orientation", in mode Quaternion. A million solids take 120 MB.
@@ -32,10 +32,10 @@ KINDS = ("spheres", "boxes", "cylinders", "capsules", "ellipsoids")
 
 
 def write_walls(chosen: Exported, path: Path) -> None:
-    """Write the walls, as far as there are particles in the first frame.
+    """Write the walls, with open ones extended to the particles in the first frame.
 
-    Where walls or openings come and go, each state of the walls is a part with cells of its own, and a step has the
-    part of its frame. Walls that only move have the same cells in all frames, and points of their own in each.
+    Where walls or openings appear and disappear, each state of the walls is a part with cells of its own, and a step
+    has the part of its frame. Walls that only move have the same cells in all frames, and points of their own in each.
     """
     trajectory, scene = chosen.trajectory, chosen.trajectory.scene
     positions, comes = trajectory.frame(chosen.numbers[0]).position, bool(scene.instants)
@@ -71,7 +71,7 @@ def write_walls(chosen: Exported, path: Path) -> None:
 
 
 def _write_moved(chosen: Exported, drawn: list[Shape], root: Any) -> None:
-    """Write the points of all frames of walls that were so at the start."""
+    """Write the points in all frames of walls drawn at the start."""
     seen = chosen.trajectory.observables
     firsts = np.cumsum([0, *(len(shape.vertices) for shape in drawn)])
     points = root.create_dataset("Points", (len(chosen.numbers) * firsts[-1], 3), np.float64)
@@ -92,7 +92,7 @@ def _data_of(scene: Scene, drawn: list[Shape]) -> dict[str, NDArray[np.int64]]:
 
 
 def _write_members(chosen: Exported, drawn: list[list[Shape]], root: Any, steps: Any) -> None:
-    """Write what is counted of the member of each cell until each frame, of which `drawn` are the walls."""
+    """Write the sums of each cell's member until each frame; `drawn` are the walls at each frame."""
     counts = [sum(len(shape.triangles) for shape in some) for some in drawn]
     firsts = np.cumsum([0, *counts])
     for name in chosen.trajectory.members():
@@ -105,7 +105,7 @@ def _write_members(chosen: Exported, drawn: list[list[Shape]], root: Any, steps:
 
 
 def _of_cells(scene: Scene, shape: Shape, of_members: Any) -> Any:
-    """For each triangle of a shape the value of its member; NaN where that is not known."""
+    """For each triangle of a shape the value of its member; NaN if that is not known."""
     if shape.place:
         number: Any = scene.parts.index((shape.surface, shape.place))
     else:
@@ -114,12 +114,12 @@ def _of_cells(scene: Scene, shape: Shape, of_members: Any) -> Any:
 
 
 def _triangles(drawn: list[Shape]) -> Any:
-    """The triangles of shapes, with the numbers of their points among those of all."""
+    """The triangles of shapes, with indices into the points of all shapes."""
     firsts = np.cumsum([0, *(len(shape.vertices) for shape in drawn)])
     return np.concatenate([shape.triangles + first for shape, first in zip(drawn, firsts, strict=False)])
 
 
-# Of each solid, with the type of a number and how many there are.
+# The data of each solid, with the type and the shape of an entry.
 _DATA: dict[str, tuple[Callable[[Solids], Any], Any, tuple[int, ...]]] = {
     "surface": (lambda one: np.full(len(one.centers), one.surface), np.int64, ()),
     "kind": (lambda one: np.full(len(one.centers), KINDS.index(one.kind)), np.int64, ()),
@@ -128,7 +128,7 @@ _DATA: dict[str, tuple[Callable[[Solids], Any], Any, tuple[int, ...]]] = {
     "orientation": (lambda one: one.turns, np.float64, (4,)),
     "Points": (lambda one: one.centers, np.float64, (3,)),
 }
-# Of a solid that moves.
+# The data of a moving solid.
 _MOVED = ("orientation", "Points")
 
 
@@ -139,13 +139,13 @@ def write_solids(chosen: Exported, path: Path) -> None:
     frames = len(times) if come or scene.moves() else 1
     counts = [sum(len(one.centers) for one in solids_of(scene, time)) for time in times[:frames]]
     firsts = np.cumsum([0, *counts])
-    # As of particles: where their number changes each step has a part of its own.
+    # As for particles: if the number changes, each step has a part of its own.
     parts = counts if len(set(counts)) > 1 else counts[:1]
     with h5py.File(path, "w") as file:
         root = vtkhdf.begin(file, {"Vertices": np.arange(max(counts))[:, None]}, parts)
         steps = vtkhdf.timed(root, chosen, firsts[:-1]) if come or scene.moves() else None
         for name, (_of_one, kind, width) in _DATA.items():
-            # What does not change is there once.
+            # Constant data are stored once.
             rows = firsts if come or name in _MOVED else firsts[:2]
             data = root.create_dataset(name if name == "Points" else f"PointData/{name}", (rows[-1], *width), kind)
             for k in range(len(rows) - 1):

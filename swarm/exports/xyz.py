@@ -1,10 +1,10 @@
-"""Extended XYZ: text, a line a particle and two before each frame; of OVITO, ASE and others.
+"""Extended XYZ: text, a line a particle and two before each frame; for OVITO, ASE and others.
 
 Readers have no common names: OVITO takes velocities from `velo` and masses from `mass`, ASE from `momenta` and
-`masses`. All are written, but for the `mass` of particles that have the same one, which is in the line before them.
+`masses`. All are written, except a `mass` that all particles share, which is in the line before them.
 
-Species are X. Lattice and Origin are there where the scene repeats: in a direction in which it does not, the cell has
-the length of the scene. Numbers have as many digits as give the same bits again.
+Species are X. Lattice and Origin are written for a periodic scene: in a direction without a period the cell has
+the length of the scene. Numbers have enough digits for the same bits.
 """
 
 import math
@@ -45,7 +45,7 @@ def write(chosen: Exported, path: Path) -> None:
 
 
 def _cell(chosen: Exported) -> str:
-    """The keys of the cell that repeats."""
+    """The keys of a periodic cell."""
     periods, scene = chosen.periods, chosen.trajectory.scene
     if not periods.any():
         return 'pbc="F F F"'

@@ -1,4 +1,4 @@
-"""HDF5 files that grow, so that a kill at any moment leaves a readable one.
+"""HDF5 files that are written row by row and stay readable if the process is killed at any moment.
 
 HDF5's mode for one writer and many readers (SWMR) orders the writes so that every prefix of them is a valid file.
 """
@@ -19,7 +19,7 @@ from .sources import cause
 
 # HDF5's default chunk cache, 1 MB a dataset, would fill during 100 000 frames, which looks like a memory leak.
 _SMALL_CACHE = 1 << 16
-# Bytes that a new file has before its first frame, about.
+# The approximate number of bytes of a new file before its first frame.
 _BEGINNING = 1 << 17
 # The oldest format with SWMR.
 _FORMAT = ("v110", "v110")
@@ -28,7 +28,7 @@ _FORMAT = ("v110", "v110")
 class AppendedFile:
     """A file that is created, or reopened to go on with it.
 
-    It gets its name by `_rename`; until then an existing file of that name stays. Subclasses create it, or find its
+    A new file gets its name by `_rename`; until then an existing file of that name stays. Subclasses create or find the
     datasets, and write to them.
     """
 
@@ -46,11 +46,11 @@ class AppendedFile:
         finally:
             self._handle.close()
         if self._is_new():
-            # Without a frame there is nothing to be read.
+            # A file without a frame has no content.
             self._part.unlink(missing_ok=True)
 
     def sync(self) -> None:
-        """Flush to the disk what was written."""
+        """Flush the written data to the disk."""
         try:
             os.fsync(self._handle.fileno())
         except OSError as error:
@@ -60,7 +60,7 @@ class AppendedFile:
         """Open the file, or raise a FileError."""
         self._size, self._block = 0, b""
         try:
-            # Without room for its beginning HDF5 crashes as it frees its objects.
+            # HDF5 crashes when it frees its objects if the disk has no room for the beginning of the file.
             if not self._following and (full := no_room(self._part, _BEGINNING)):
                 raise OSError(full)
             self._open_as("r+" if self._following else "w")
@@ -78,7 +78,7 @@ class AppendedFile:
         self._descriptor = int(self._file.id.get_vfd_handle())
 
     def _find(self) -> None:
-        """Find the datasets of a file that is there, and begin."""
+        """Find the datasets of an existing file, and begin."""
         raise NotImplementedError
 
     def _begin(self) -> None:
@@ -87,16 +87,16 @@ class AppendedFile:
         self._flush()
 
     def _flush(self) -> None:
-        """Write what HDF5 holds back: then the file can be read, whatever happens to the process."""
+        """Write the buffers of HDF5, after which the file can be read even if the process is killed."""
         self._file.flush()
         self._block = superblock.unmark(self._handle)
         self._size = os.fstat(self._handle.fileno()).st_size
 
     @contextlib.contextmanager
     def _beginning(self) -> Iterator[None]:
-        """Open the file, and create it or find its datasets; of a new one an error leaves nothing.
+        """Open the file, and create or find its datasets; an error removes a new file.
 
-        HDF5 would crash the process if a file that it cannot write were closed as it is.
+        HDF5 would crash the process if it closed a file with data that it cannot write.
         """
         self._open()
         try:
@@ -104,7 +104,7 @@ class AppendedFile:
                 try:
                     yield
                 except (LookupError, ValueError):
-                    # What was not written cannot be read back: why says the system.
+                    # Unwritten data cannot be read back; the flush raises the system's reason.
                     self._file.flush()
                     raise
         except FileError as error:
@@ -113,7 +113,7 @@ class AppendedFile:
 
     @contextlib.contextmanager
     def _writing(self, what: str) -> Iterator[None]:
-        """Write `what`; an error is a FileError that leaves what was written before as it is."""
+        """Write `what`; turn an error into a FileError and leave earlier data as they were."""
         try:
             self._require_there()
             yield
@@ -140,7 +140,7 @@ class AppendedFile:
             self._find()
 
     def _is_new(self) -> bool:
-        """Whether it has no name yet."""
+        """Whether the file has not got its name yet."""
         return self._part != self._path
 
     def _require_there(self) -> None:
@@ -161,7 +161,7 @@ class AppendedFile:
     def _abandon(self) -> None:
         """Send further writes to the null device: HDF5's buffers of a failed frame would damage earlier ones."""
         try:
-            # HDF5 is not asked: it crashes the process if it could not close the file.
+            # The descriptor is tested without HDF5, which crashes the process if it could not close the file.
             if not os.path.samestat(os.fstat(self._descriptor), os.fstat(self._handle.fileno())):
                 return  # abandoned already
         except (OSError, ValueError):
@@ -172,7 +172,7 @@ class AppendedFile:
 
 
 def put(dataset: Any, first: int, values: Any) -> Any:
-    """Write entries from row `first` on; return them as they are written.
+    """Write entries from row `first` on; return them as they are stored.
 
     h5py's indexing takes four times as long, for twenty datasets a frame.
     """

@@ -1,4 +1,4 @@
-"""Frames written in the background: by a thread that reads a short queue."""
+"""Frames written in the background, by a thread that reads a short queue."""
 
 import contextlib
 import math
@@ -15,8 +15,8 @@ from ..state import State
 from .layout import KEPT
 from .writer import WriteFrames, Written
 
-# Frames are written in batches, up to the end of a chunk of the file (`_CHUNK` in writer.py): with 10 000 particles a
-# single frame takes 2.5 ms, one of a batch of ten 0.9 ms. No frame waits longer than this for others [s].
+# Frames are written in batches that end with a chunk of the file (`_CHUNK` in writer.py): with 10 000 particles a
+# single frame takes 2.5 ms, a frame of a batch of ten 0.9 ms. No frame waits longer than this for others [s].
 CHUNK_FRAMES = 10
 _PATIENCE = 0.05
 # The most frames in the queue: half of them are written while the others are computed. A longer queue would only hide a
@@ -31,12 +31,12 @@ WriteFrame = Callable[[int, float, State, dict[str, Any]], None]
 
 
 def _copies_of(n: int) -> int:
-    """The most frames of n particles in the queue."""
+    """The largest number of frames of n particles in the queue."""
     return max(1, min(_COPIES, _BYTES // (_PARTICLE * max(1, n))))
 
 
 def waiting_bytes(n: int) -> int:
-    """The most bytes of the frames of n particles in the queue.
+    """The largest number of bytes of the frames of n particles in the queue.
 
     >>> waiting_bytes(1_000_000)
     88000000
@@ -45,14 +45,14 @@ def waiting_bytes(n: int) -> int:
 
 
 class Writer(Protocol):
-    """A context that gives the function that writes frames."""
+    """A context that returns the function that writes frames."""
 
     def __enter__(self) -> WriteFrames: ...
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any, /) -> None: ...
 
     def sync(self) -> None:
-        """Flush to the disk what was written."""
+        """Flush the written data to the disk."""
 
 
 class Several:
@@ -76,7 +76,7 @@ class Several:
         self._stack.__exit__(*error)
 
     def sync(self) -> None:
-        """Flush to the disk what was written."""
+        """Flush the written data to the disk."""
         for writer, _kept in self._writers:
             writer.sync()
 
@@ -86,12 +86,12 @@ def _some(state: State, kept: slice) -> State:
 
 
 def _copied(state: State) -> list[str]:
-    """The names of the arrays of a state that writers take; those that it does not have are left out."""
+    """The names of the arrays of a state that writers take and that the state has."""
     return [name for name in KEPT if getattr(state, name) is not None]
 
 
 class Background:
-    """A context that gives a function which queues a copy of a frame; a thread writes all queued frames at once.
+    """A context that returns a function which queues a copy of a frame; a thread writes all queued frames at once.
 
     When the context ends, every frame is written. An error of the writer is raised at the next frame, or at the end.
 
@@ -99,8 +99,8 @@ class Background:
         writer: writes the frames, in the thread.
         n: the number of particles.
         kept: the particles that are copied and written.
-        born: (n,) the times at which the particles come [s], in ascending order; None: all are there from the start.
-            Particles that come after a frame are at NaN in it.
+        born: (n,) the times at which the particles come [s], in ascending order; None: all exist from the start.
+            A frame has NaN for particles that come after it.
     """
 
     def __init__(
@@ -109,9 +109,9 @@ class Background:
         self._writer, self._kept = writer, kept
         self._born = None if born is None else born[kept]
         n = max(1, len(range(n)[kept]))
-        # An event is set when all frames before it are written; a function is called; None ends the thread.
+        # The queue has also events, set when the frames before them are written, functions to call, and a last None.
         self._frames: queue.SimpleQueue[Written | threading.Event | Job | None] = queue.SimpleQueue()
-        # Every frame needs one of these copies, so that the queue is no longer than they are.
+        # Every frame needs one of these copies, so their number limits the length of the queue.
         self._copies: queue.SimpleQueue[State | None] = queue.SimpleQueue()
         copies = _copies_of(n)
         for _ in range(copies):
@@ -137,7 +137,7 @@ class Background:
             raise problem
 
     def backlog(self) -> float:
-        """The time to write the frames in the queue [s], each as long as one of the latest batch."""
+        """The time to write the frames in the queue [s], estimated from the latest batch."""
         return self.seconds * max(0, self._queued - self.written)
 
     def _put(self, number: int, moment: float, state: State, seen: dict[str, Any]) -> None:
@@ -159,11 +159,11 @@ class Background:
         self._frames.put((number, moment, copy, seen))
 
     def do(self, job: Job) -> None:
-        """Call a function in the thread, after the frames that are in the queue."""
+        """Call a function in the thread, after the frames in the queue are written."""
         self._frames.put(job)
 
     def drain(self) -> None:
-        """Wait until every frame so far is on the disk."""
+        """Wait until all frames in the queue are on the disk."""
         written = threading.Event()
         self._frames.put(written)
         written.wait()
@@ -175,7 +175,7 @@ class Background:
         end: object = True
         while end is not None:
             frames, end = self._gather()
-            # No frame is written after one that could not be.
+            # A frame after one that failed is not written.
             if frames and self._problem is None:
                 began = time.perf_counter()
                 try:
@@ -190,7 +190,7 @@ class Background:
                 end.set()
 
     def _gather(self) -> tuple[list[Written], object]:
-        """The next batch of frames, and what ended it: None at the end of the run, an event, or True."""
+        """Return the next batch of frames, and the entry that ends it: None at the end of a run, an event, or True."""
         frames: list[Written] = []
         frame, latest = self._frames.get(), math.inf
         while frame is not None and not isinstance(frame, threading.Event):

@@ -1,7 +1,7 @@
-"""Checkpoints: what a run needs to continue with the same bits, in one NumPy archive that is replaced atomically.
+"""Checkpoints: the data a run needs to continue with the same bits, in one NumPy archive that is replaced atomically.
 
-A line of JSON under "job" describes the run and its progress; the other entries are the arrays of `Run.arrays`. Each
-has a checksum.
+A line of JSON under "job" describes the run and its progress; the other entries are the arrays of `Run.arrays`. Every
+entry has a checksum.
 """
 
 import contextlib
@@ -33,9 +33,9 @@ _FIRST = b"job.npy"
 _HEAD = 30 + len(_FIRST)
 # The array of a checkpoint of a run on a cluster that holds the bounds of its shards.
 SHARDS = "shards"
-# The array that says which surface, and which member of it, each wall of the kernels is, by which rows are in order.
+# The array with the surface, and the member of it, of each row that the kernels have for a wall.
 _OWNERS = "owners"
-# Surfaces that a sentence lists.
+# The largest number of surfaces that a sentence lists.
 _SHOWN = 12
 _ANEW = "start a new run from the last frame of its trajectory (from = in [particles]), or start again with --overwrite"
 _HINT = "use the inputs that it was started with, or start again with --overwrite"
@@ -46,17 +46,17 @@ class SavedRun:
     """A run and its progress.
 
     Attributes:
-        version, scene, method, storage: as text; particles: their number; start: a digest of them at the start.
-        frame, time: the last frame that was written [s].
+        version, scene, method, storage: their texts; particles: their number; start: a digest of them at the start.
+        frame, time: the last frame that was written, and its time [s].
         following: time of the frame that is being computed [s], or None.
-        wall_time: used so far [s].
-        seed: of thermal walls.
-        kept: what the log of impacts keeps, as text, or ""; rows: how many it has.
-        sums: checksums of those of the frame that is being computed, by column, as text; "" of older versions.
+        wall_time: wall time used so far [s].
+        seed: the seed of thermal walls.
+        kept: the selection of the log of impacts, as text, or ""; rows: the number of its rows.
+        sums: checksums of the log's rows in the frame that is being computed, by column, as text; "" in older versions.
         member_impacts: whether the impacts on each member are counted.
         observables: the names of the user-defined observables, in order.
-        counters: as text, or "".
-        first: of a shard the number of its first particle, or body, in the whole run.
+        counters: the counters, as text, or "".
+        first: for a shard, the number of its first particle, or body, in the whole run.
     """
 
     version: str
@@ -79,7 +79,7 @@ class SavedRun:
     first: int = 0
 
     def require_same(self, other: "SavedRun", path: Path) -> None:
-        """Raise a SceneError that names both values if `other` is not the run of this checkpoint."""
+        """Raise a SceneError that names both values if `other` is another run than that of this checkpoint."""
         for name, what in _NAMES.items():
             mine, its = (_on_one_line(str(getattr(job, name))) for job in (self, other))
             if getattr(self, name) != getattr(other, name):
@@ -90,7 +90,7 @@ class SavedRun:
 
 
 def _on_one_line(text: str) -> str:
-    """A text of TOML on one line, with its lists as a reader writes them."""
+    """Return a text of TOML on one line, with its lists as a reader writes them."""
     lists = re.sub(r",?\n\s*\]", "]", re.sub(r"\[\n\s*", "[", text))
     return re.sub(r",?\s*\n\s*", ", ", lists.strip())
 
@@ -126,7 +126,7 @@ def digest_of(particles: Particles, body: str = "") -> str:
 def save(path: Path, job: SavedRun, arrays: Arrays, owners: NDArray[np.int64] | None = None) -> None:
     """Replace the checkpoint; the old one stays until the new one is completely on the disk.
 
-    `owners` are those of the rows that the arrays have for walls, as `Scene.members`.
+    `owners` are the surfaces and members of the rows for walls, as in `Scene.members`.
 
     Raises:
         FileError: it cannot be written.
@@ -145,7 +145,7 @@ def is_one(path: Path) -> bool:
 
 
 def read(path: Path) -> tuple[SavedRun, Arrays]:
-    """A checkpoint.
+    """Read a checkpoint.
 
     Raises:
         SceneError: it is damaged.
@@ -165,7 +165,7 @@ def read(path: Path) -> tuple[SavedRun, Arrays]:
 
 
 def require_owners(path: Path, arrays: Arrays, owners: NDArray[np.int64]) -> None:
-    """Raise a SceneError unless the rows of a checkpoint are of the same walls as those of the run; drop `owners`."""
+    """Raise a SceneError unless the rows for walls belong to the same walls as in the run; remove `owners`."""
     saved = arrays.pop(_OWNERS, None)
     if saved is None:
         raise SceneError(
@@ -193,8 +193,8 @@ def require_fit(
     """Raise a SceneError unless the arrays of a checkpoint have the names, types and shapes of the run's own.
 
     The lanes of a run halted within a frame may hold any number of particles, each once.
-    `may_grow` says of which other arrays the first axis may have any length. `written` is the version that wrote it.
-    Checksums are right, so what differs is probably the version; but a list of the entries has no checksum.
+    `may_grow` tells whether the first axis of another array may have any length; `written` is the version of the file.
+    The values have the right checksums, so a difference probably comes from the version; the list of entries has none.
     """
     same = ", perhaps of another commit," if written == VERSION else ""
     begin = (
@@ -207,7 +207,7 @@ def require_fit(
             for names in (run.keys() - arrays.keys(), arrays.keys() - run.keys())
         )
         raise SceneError(f"{begin} the arrays {lacking} too, got {more} in their place; {_ANEW}")
-    # Bodies leave nothing in lanes.
+    # Bodies are never halted in lanes.
     left = arrays["halted.particle"].shape[-1:] if "halted.particle" in run else ()
     for name, mine in run.items():
         shape = mine.shape[:-1] + left if name.startswith("halted.") else mine.shape

@@ -1,11 +1,11 @@
-"""Checksums of the values of an HDF5 file: of each row of what grows, and of what is written once.
+"""Checksums of the values of an HDF5 file: of each row of a growing dataset, and of each constant.
 
 HDF5 has checksums of its metadata (objects, attributes of a fixed length, indexes of chunks), not of values. Its filter
-Fletcher-32 would cover a chunk as a whole: one of ten frames is written again as each of them comes, and a kill in the
-middle of that would lose the frames before it, which other processes could not read meanwhile either. So each row of a
+Fletcher-32 would cover a chunk as a whole: a chunk of ten frames is written again with each of them, and a kill during
+that would lose the earlier frames, which other processes could not read meanwhile either. So each row of a
 dataset, in blocks of 250 particles, has a CRC-32 in the file: parameters/checksums/rows, (frames, columns) uint32, 0 if
-it is not known. parameters/checksums/columns says of which dataset the columns are, a line of its name, how many
-there are, and the entries of each (0: the row). parameters/checksums/constants has a line of the name and the checksum
+it is not known. parameters/checksums/columns lists the datasets of these columns, one a line: its name, its number of
+columns, and the entries in each (0: the row). parameters/checksums/constants has a line of the name and the checksum
 of each dataset that is written once, and of each attribute that is a text, GROUP@NAME. Both are texts of a fixed
 length. Files of older versions have no checksums.
 """
@@ -24,18 +24,18 @@ from .layout import text
 
 GROUP = "parameters/checksums"
 _ROWS, _COLUMNS, _CONSTANTS = (f"{GROUP}/{name}" for name in ("rows", "columns", "constants"))
-# Particles of a block: the path of one is read with those beside it, and a call takes as long as a few kB.
+# Particles of a block: the path of one is read with those of its block, and a call takes as long as a few kB.
 BLOCK = 250
 # Bytes of a chunk of checksums.
 _CHUNK = 1 << 14
-# Rows that are read at once, in bytes.
+# Bytes of the rows that are read at once.
 _AT_ONCE = 1 << 24
 
 Sums = NDArray[np.uint32]
 
 
 def checksum_of(data: Any, before: int = 0) -> int:
-    """The CRC-32 of the bytes of an array or a text, after those of which it is `before`; never 0."""
+    """The CRC-32 of the bytes of an array or a text, continued from the checksum `before`; never 0."""
     if isinstance(data, str):
         return zlib.crc32(data.encode("utf-8", "surrogateescape"), before) or 1
     values: Any = np.ascontiguousarray(data)
@@ -44,7 +44,7 @@ def checksum_of(data: Any, before: int = 0) -> int:
 
 
 def row_sums(entries: Any, block: int = 0) -> Sums:
-    """The checksums of rows (rows, n, ...), of each or of each `block` of its n entries: (rows, blocks).
+    """The checksums of rows (rows, n, ...), one a row or one for each `block` of its n entries: (rows, blocks).
 
     >>> row_sums(np.zeros((2, 5, 3)), 2).shape
     (2, 3)
@@ -66,16 +66,16 @@ def row_sums(entries: Any, block: int = 0) -> Sums:
 
 
 class RowSums:
-    """The checksums of the rows of a file that is written."""
+    """The checksums of the rows of a file that is being written."""
 
     def __init__(self, file: Any, blocks: dict[str, tuple[int, int]]) -> None:
         self._data, self._new, self._blocks = file[_ROWS], dict[str, Sums](), blocks
 
     @classmethod
     def create(cls, file: Any, growing: dict[str, tuple[int, int]], other: Sequence[str] = ()) -> "RowSums":
-        """Make room for the checksums of growing datasets, and add those of constant ones.
+        """Create the dataset of checksums of growing datasets, and write the checksums of constants.
 
-        `growing` has the entries of a row and of a block of each. The `other` datasets get no checksums.
+        `growing` has the entries of a row and of a block for each. The `other` datasets get no checksums.
         """
         blocks = {
             name: (max(1, -(-entries // block)) if block else 1, block) for name, (entries, block) in growing.items()
@@ -91,7 +91,7 @@ class RowSums:
         known = {name: one for name, one in objects if _is_constant(name, one) and name not in (*growing, *other)}
         sums = {name: checksum_of(_value(known[name])) for name in sorted(known)}
         file[_CONSTANTS] = np.bytes_(_serialized(sums | _attributes(objects)))
-        # From a full disk nothing can be read back.
+        # A file on a full disk cannot be read back.
         return cls(file, blocks)
 
     @classmethod
@@ -102,7 +102,7 @@ class RowSums:
         return cls(file, {name: (count, block) for name, count, block in _columns(file)})
 
     def forget(self, first: int, count: int) -> bool:
-        """Whether some of these rows have checksums; from now on they are not known, until they are written."""
+        """Mark checksums of rows as unknown until the rows are written again; return whether there were some."""
         there = min(count, int(self._data.shape[0]) - first)
         if there > 0:
             put(self._data, first, np.zeros((there, self._data.shape[1]), np.uint32))
@@ -118,7 +118,7 @@ class RowSums:
         self._new |= {name: np.array(each, np.uint32)[:, None] for name, each in sums.items()}
 
     def write(self, first: int) -> None:
-        """Write what was added, from row `first` on."""
+        """Write the added checksums, from row `first` on."""
         rows = len(next(iter(self._new.values())))
         # A dataset that was removed from the file has no new rows; its checksums are 0, which means unknown.
         nothing = {name: np.zeros((rows, count), np.uint32) for name, (count, _block) in self._blocks.items()}
@@ -132,7 +132,7 @@ def checksum_of_attribute(group: Any, name: str) -> int:
 
 
 def _objects(file: Any, is_wanted: Callable[[str, Any], bool]) -> list[tuple[str, Any]]:
-    """The names of groups with attributes, and of datasets that are wanted for what HDF5 says about them, and these.
+    """Return groups with attributes, and the datasets that `is_wanted` selects by HDF5's information, with their names.
 
     Each comes once, though links give some of them several names.
     """
@@ -158,7 +158,7 @@ def _attributes(objects: list[tuple[str, Any]]) -> dict[str, int]:
 
 
 def replace(file: Any, values: dict[str, Any]) -> None:
-    """Write constants anew; a kill at any moment leaves a file in which they are as before, as now, or not known."""
+    """Write constants anew; if the process is killed, their checksums fit the old values or the new, or are unknown."""
     known = dict(_constants(file)) if _CONSTANTS in file else {}
     values = {name: value for name, value in values.items() if file[name][()] != value}
     if not values:
@@ -176,7 +176,7 @@ def replace(file: Any, values: dict[str, Any]) -> None:
 
 
 def _is_constant(name: str, one: Any) -> bool:
-    """Whether an object of a file is a dataset that does not grow, and is not one of checksums."""
+    """Whether an object of a file is a dataset that does not grow and holds no checksums."""
     if not isinstance(one, h5py.Dataset) or name.startswith(GROUP):
         return False
     return one.shape == () or (one.maxshape[0] is not None and not one.is_virtual)
@@ -188,9 +188,9 @@ def constants(file: Any) -> list[str]:
 
 
 class Checked:
-    """Reads the values of a file, and holds them against their checksums, if it has some.
+    """A reader of the values of a file that compares them with their checksums, if the file has some.
 
-    A value that differs is a ValueError that names its dataset and its frame, or what a row of it is.
+    A value that differs raises a ValueError that names its dataset and its frame.
     """
 
     def __init__(self, file: Any, path: Path, opened: Callable[[Path], Any]) -> None:
@@ -210,22 +210,22 @@ class Checked:
             part._file.close()
 
     def has_any(self) -> bool:
-        """Whether there are checksums."""
+        """Whether the file has checksums."""
         return self._sums is not None
 
     def constant(self, name: str) -> Any:
-        """A dataset that is written once: a number, an array or a text."""
+        """Return a dataset that is written once: a number, an array or a text."""
         value = text(self._file[name], self._path) if _is_text(self._file[name]) else self._file[name][()]
         if (known := self._constants.get(name)) and known != checksum_of(value):
             raise ValueError(f"{name} does not match its checksum")
         return value
 
     def row(self, name: str, k: int) -> Any:
-        """Row k of a dataset that grows."""
+        """Return row k of a growing dataset."""
         return self.rows(name, k, k + 1)[0]
 
     def rows(self, name: str, first: int, last: int) -> Any:
-        """Rows of a dataset that grows."""
+        """Return rows of a growing dataset."""
         data, is_virtual = self._dataset(name)
         if is_virtual:
             return self._joined(data, first, last)
@@ -236,7 +236,7 @@ class Checked:
         return values
 
     def path(self, name: str, i: int, frames: int) -> Any:
-        """Entry i of the first rows of a dataset, (rows, ...)."""
+        """Return entry i of the first rows of a dataset, (rows, ...)."""
         data, is_virtual = self._dataset(name)
         if is_virtual:
             for one in data.virtual_sources():
@@ -259,7 +259,7 @@ class Checked:
         return np.concatenate(found) if found else data[:0, i]
 
     def compare_rows(self, name: str, data: Any, k: int, rows: tuple[int, int]) -> None:
-        """Hold the rows of a column that are of frame k against their checksum."""
+        """Compare the rows of a column that belong to frame k with their checksum."""
         if name in self._places:
             found, (begin, end) = 0, rows
             each = _AT_ONCE // (data.dtype.itemsize * int(np.prod(data.shape[1:])))
@@ -268,21 +268,21 @@ class Checked:
             self._compare(name, k, np.array([[found or 1]], np.uint32), self._sums[k : k + 1, self._places[name][0]])
 
     def require_constants(self) -> None:
-        """Hold all that is written once against its checksum."""
+        """Compare all constants with their checksums."""
         for name in constants(self._file):
             self.constant(name)
-        # Behind the texts: these say whether the heap, in which the texts of attributes are too, can be read.
+        # Texts come first: their check tells whether the heap, which also holds the texts of attributes, can be read.
         self.require_attributes()
 
     def require_attributes(self, group: str = "") -> None:
-        """Hold the attributes of a group, or of all of them, that are texts against their checksums."""
+        """Compare the text attributes of a group, or of all groups, with their checksums."""
         for name, known in self._constants.items():
             where, has_one, attribute = name.rpartition("@")
             if has_one and where.startswith(group) and checksum_of_attribute(self._file[where], attribute) != known:
                 raise ValueError(f"the attribute {attribute} of {where} does not match its checksum")
 
     def require_intact(self, frames: int) -> None:
-        """Hold all constants, and all rows of the first frames, against their checksums."""
+        """Compare all constants, and all rows of the first frames, with their checksums."""
         self.require_constants()
         virtual = [f"particles/all/{name}/value" for name in self._file.get("particles/all", ())]
         virtual = [name for name in virtual if name in self._file and self._file[name].is_virtual]
@@ -293,7 +293,7 @@ class Checked:
                 self.rows(name, first, min(frames, first + each))
 
     def _dataset(self, name: str) -> tuple[Any, bool]:
-        """A dataset that grows, and whether it is virtual. To open it and to ask takes as long as to read a frame."""
+        """Return a growing dataset and whether it is virtual, cached: to open it takes as long as to read a frame."""
         if name not in self._datasets:
             data = self._file[name]
             self._datasets[name] = data, data.is_virtual
@@ -308,14 +308,14 @@ class Checked:
             raise ValueError(f"{shown} of frame {first + int(wrong.argmax())} does not match its checksum")
 
     def _part(self, name: str) -> "Checked":
-        """The file of a shard."""
+        """Return the reader of the file of a shard."""
         if name not in self._parts:
             path = self._path.parent / name
             self._parts[name] = Checked(self._opened(path), path, self._opened)
         return self._parts[name]
 
     def _joined(self, data: Any, first: int, last: int) -> Any:
-        """Rows of a virtual dataset, which are in the files of shards."""
+        """Return rows of a virtual dataset, which are in the files of shards."""
         out, read = np.zeros((last - first, *data.shape[1:]), data.dtype), dict[str, Any]()
         for one in data.virtual_sources():
             (_, to, *_), (_, end, *_) = one.vspace.get_select_bounds()

@@ -1,8 +1,8 @@
-"""HDF5 files that others in this process have open too.
+"""HDF5 files that other code in this process has open too.
 
-In one process HDF5 allows one setting of locks, and one of reading or writing, for a file and a driver, and other code
-may have opened the file with another. The logging driver reads and writes like the default one, logs nothing by
-default, and is rarely used: what others have opened by the default one does not matter to it.
+In one process HDF5 allows one setting of locks, and one mode of access, for a file and a driver, and other code
+may have opened the file with another setting. The logging driver reads and writes like the default one, logs nothing by
+default, and is rarely used, so that files opened by the default driver do not conflict with it.
 """
 
 import weakref
@@ -18,8 +18,8 @@ NAME = "swarm"
 
 h5py.register_driver(NAME, lambda plist, **_options: plist.set_fapl_log(b"", 0, 0))
 
-# The files that this process has opened by it, and which they are. HDF5 is not asked: it crashes the process if it
-# could not close one, on a full disk.
+# The files that this process has opened by this driver, and their identities. HDF5 cannot list them safely: it crashes
+# the process if it could not close one on a full disk.
 _opened: list[tuple[weakref.ref[h5py.File], tuple[int, int] | None]] = []
 
 
@@ -31,19 +31,19 @@ def open_by(path: Path, mode: str, **options: Any) -> h5py.File:
 
 
 def opened_to_write(path: Path, mode: str, **options: Any) -> h5py.File:
-    """Open a file to write it."""
+    """Open a file for writing."""
     try:
         return open_by(path, mode, **options)
     except OSError:
-        # A reader of swarm has it open by this driver.
+        # A reader of swarm has the file open by this driver.
         return h5py.File(path, mode, **options)
 
 
 def has_open(path: Path) -> bool:
-    """Whether this process has the file open by this driver: by it, it could only be opened as it was then."""
+    """Whether this process has the file open by this driver, which then opens it in the same mode only."""
     return paths.identity(path) in [identity for _file, identity in _open()]
 
 
 def _open() -> list[tuple[weakref.ref[h5py.File], tuple[int, int] | None]]:
-    """The files that are open still."""
+    """Return the files that are still open."""
     return [(found, identity) for found, identity in _opened if found()]

@@ -27,7 +27,7 @@ _NEEDED = (
     "impacts/time", "frames/complete", "frames/time", "frames/rows", "walls/surface", "walls/member",
     "parameters/scene",
 )  # fmt: skip
-# Rows that are read at once, so that what is left out takes no memory.
+# Rows that are read at once, so that rows that are not wanted take no memory.
 _AT_ONCE = 1 << 20
 
 
@@ -35,10 +35,10 @@ class ImpactLog(Stored):
     """A log of impacts on disk, read on demand.
 
     Attributes:
-        times: (frames,) of the complete frames [s].
-        ends: (frames,) how many impacts there are at the end of each.
-        scene, method: as they were run.
-        count: number of particles that were run.
+        times: (frames,) the times of the complete frames [s].
+        ends: (frames,) the number of impacts until the end of each.
+        scene, method: those of the run.
+        count: number of particles of the run.
 
     The impacts are those of complete frames. A log that is being written, or that a killed run left, can be read, with
     the frames that are complete when it is opened. Inconsistent content raises a SceneError that names the part.
@@ -58,14 +58,14 @@ class ImpactLog(Stored):
             raise
 
     def _check(self, file: Any) -> None:
-        """Read what says which rows there are; a ValueError says what is inconsistent."""
+        """Read the data that say which rows exist; raise a ValueError about an inconsistent part."""
         for name in _TEXTS:
             if h5py.check_string_dtype(layout.dataset(file, f"parameters/{name}").dtype) is None:
                 raise ValueError(f"parameters/{name} must be a text")
         frames, *known = layout.dataset(file, "frames/complete", "iu", (None,))[()].tolist()
         if frames < 0:
             raise ValueError(f"frames/complete must be 0 or more, got {frames}")
-        # Files of older versions have no checksum of it.
+        # Files of older versions have no checksum of the number.
         if known and known[0] != checksum_of(np.int64(frames)):
             raise ValueError(f"frames/complete does not match its checksum, got {frames}")
         layout.require_fits(layout.dataset(file, "frames/time", "f", (frames,)), frames, self.path)
@@ -87,11 +87,11 @@ class ImpactLog(Stored):
         layout.dataset(file, "walls/member", "iu", layout.dataset(file, "walls/surface", "iu", (None,)).shape)
         walls = (self._checked.constant(f"walls/{name}").astype(np.int32) for name in ("surface", "member"))
         self._surface, self._member = walls
-        # How many there are; their rows have walls below 0.
+        # The number of counters; their rows have walls below 0.
         self._counters = len(self.counters)
 
     def __len__(self) -> int:
-        """Number of impacts, of complete frames."""
+        """Number of impacts of complete frames."""
         return self._rows
 
     def __repr__(self) -> str:
@@ -104,7 +104,7 @@ class ImpactLog(Stored):
 
     @property
     def kept(self) -> int | list[int]:
-        """The particles with impacts that are kept: k is every k-th one, or their numbers."""
+        """The particles with impacts that are kept: k for every k-th one, or a list of their numbers."""
         with self._reading("which particles it keeps"):
             kept = parsed(self._text("kept"))["particles"]
             if kept == "all":
@@ -112,11 +112,11 @@ class ImpactLog(Stored):
             return int(kept) if isinstance(kept, int) else sorted({whole("particle", i) for i in kept})
 
     def counts(self) -> NDArray[np.int64]:
-        """Number of impacts on each surface, no collisions, with a last row of each particle that passed an opening."""
+        """Number of impacts on each surface, without collisions; a passage through an opening counts as one."""
         return self._counted()[0]
 
     def crossings(self) -> NDArray[np.int64]:
-        """Number of rows of each counter, (counters, 2), out and back."""
+        """Number of rows of each counter, (counters, 2): out of its admissible side, and back."""
         return self._counted()[1]
 
     def _counted(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -140,13 +140,13 @@ class ImpactLog(Stored):
         return {**texts, **identity, "counters": self.counters_text}
 
     def require_holds(self, frames: int, rows: int, sums: str, checkpoint: Path) -> None:
-        """Raise a SceneError if there are fewer frames, or fewer or other rows with those of the frame after them.
+        """Raise a SceneError if there are fewer frames, or other rows, than `checkpoint` says.
 
         Args:
-            frames: how many frames are complete.
-            rows: how many rows there are with those of the frame after them.
+            frames: the number of complete frames.
+            rows: the number of rows of these frames and of the frame after them.
             sums: the checksums of the rows after these frames, by column, as text; "": they are not known.
-            checkpoint: the file that says so.
+            checkpoint: the file with these numbers, for the sentence.
         """
         with self._reading("its rows") as file:
             layout.require_index(file)
@@ -185,51 +185,51 @@ class ImpactLog(Stored):
     ) -> NDArray[Any]:
         """The impacts as a structured array, in the order of time, and of particles at the same time.
 
-        The order and every bit are the same for any number of threads. What is not asked for takes no memory; of the
-        file the frames between `begin` and `end` are read.
+        The order and every bit are the same for any number of threads. Rows that are left out take no memory; only the
+        frames between `begin` and `end` are read from the file.
 
         Args:
-            particles: only of this particle, or of these; None: all.
-            surfaces: only on this surface of the scene, or on these; None: all, and crossings of counters.
-            begin: only from this time on [s]; None: from the start.
-            end: only before this time [s]; None: to the last frame.
+            particles: only rows of this particle, or of these; None: all.
+            surfaces: only rows of this surface of the scene, or of these; None: all, and crossings of counters.
+            begin: only rows from this time on [s]; None: from the start.
+            end: only rows before this time [s]; None: to the last frame.
 
         Returns:
-            One row an impact: `time` [s], `particle`, `surface` (its place in `scene.surfaces`), `member` (the number
-            of the body in that surface if it is many, of the triangle in a mesh, of the part of a union among
+            One row an impact: `time` [s], `particle`, `surface` (index in `scene.surfaces`), `member` (the number of
+            the body in a surface of several bodies, of the triangle in a mesh, of the part of a union among
             `scene.parts`; else -1), `position` (3,) [m] of the particle at the impact,
             `velocity_before` and `velocity_after` (3,) [m/s], `impulse` [N s], given along the wall's normal. Where a
-            surface has friction also `slip` (3,) [m/s], the tangential velocity relative to the wall, before. Where the
-            scene repeats, the position is in the cell and `image` (3,) says how many cells away that is.
+            surface has friction also `slip` (3,) [m/s], the tangential velocity relative to the wall before the impact.
+            In a periodic scene the position is in the cell and `image` (3,) says how many cells away that cell is.
 
             A particle that passes an opening of a surface has its last row there, with an impulse of 0.
 
-            Of bodies `particle` is the number of the copy, and an impact of several contact points has a row for each:
-            place, velocities and impulse are those of the contact point. Impacts in cavities that a point of the body
-            carries, and ways through openings, have no rows. A crossing is that of the centre of mass.
+            For bodies `particle` is the number of the copy, and an impact of several contact points has a row for each:
+            position, velocities and impulse are those of the contact point. Impacts in cavities carried by a point of
+            the body, and passages through openings, have no rows. A crossing is that of the centre of mass.
 
-            Of particles with a radius a collision of two is a row too, of the one with the smaller number: `partner` is
-            the other one, -1 at a wall, `impulse` what each gives the other along the line of their centres, and both
-            `surface` and `member` are -1.
+            For particles with a radius a collision of two is a row too, under the smaller of their numbers: `partner`
+            is the number of the other one, -1 at a wall, `impulse` acts on each along the line of their centres, and
+            both `surface` and `member` are -1.
 
-            A contact of two grains, or of a grain with a wall, lasts, and has its row where it ends, as laws of walls
-            act there: `time` is the end of the step, `velocity_before` is that at the start of the contact, `impulse`
+            A contact of two grains, or of a grain with a wall, lasts, and has its row at its end, where laws of walls
+            act: `time` is the end of the step, `velocity_before` the velocity at the start of the contact, `impulse`
             the sum of its normal impulses, and further columns are `duration` [s], `largest_force` [N] along the normal
-            and `friction_loss` [J], what friction and the resistance to rolling have taken. At a face of a mesh or an
-            outline `member` is that of the end. A contact has no row that lasts at the end of the run, or that the wall
-            leaves, by an opening or as it is `present` no more.
+            and `friction_loss` [J], the energy that friction and rolling resistance have taken. For a mesh or an
+            outline `member` is the face at the end. A contact has no row if it lasts at the end of the run, or if the
+            wall goes, by an opening or because it is no longer `present`.
 
-            A contact of a point with a soft wall has its row where it ends too, with the whole impulse of that wall.
-            One that laws do not end, as the wall leaves or another wall absorbs the point, has the same velocity twice.
-            The observable "impacts" counts it where it begins: it is the number of rows and of contacts that last.
+            A contact of a point with a soft wall has its row at its end too, with the whole impulse of that wall. If
+            laws do not end it, because the wall goes or another wall absorbs the point, both velocities are the same.
+            The observable "impacts" counts a contact at its start: it is the number of rows and of contacts that last.
 
             In a run with counters a crossing is a row too, with an impulse of 0 and the velocity at the crossing twice:
-            `counter` is the place of the counter in `counters` and `sense` 0 out of its admissible side, 1 back, and
-            both `surface` and `member` are -1. Of impacts `counter` and `sense` are -1.
+            `counter` is the index of the counter in `counters` and `sense` 0 out of its admissible side, 1 back, and
+            both `surface` and `member` are -1. Rows of impacts have -1 for `counter` and `sense`.
 
-            A contact step begins at the impact, and `velocity_after` is that at its end. After an impact that is the
-            last of a series, `velocity_after` is the velocity along the wall. What slides, rests or is pressed into an
-            edge by several walls has no impacts: its impulse is in the observable alone.
+            A contact step begins at the impact, and `velocity_after` is the velocity at its end. After the last impact
+            of a series `velocity_after` is the velocity along the wall. A particle that slides, rests or is pressed
+            into an edge by several walls has no impacts: its impulse is in the observable alone.
 
         Raises:
             SceneError: an argument is out of its range, or the file is damaged.
@@ -242,7 +242,7 @@ class ImpactLog(Stored):
             _among("particles", particles, self.count), _among("surfaces", surfaces, self._surfaces()),
             surfaces is None,
         )  # fmt: skip
-        # The rows of the frames that this time is in.
+        # The rows of the frames that overlap this span of time.
         begins = np.append(0, self.ends)
         first = int(begins[np.searchsorted(self.times, low)])
         last = int(begins[min(int(np.searchsorted(self.times, high)) + 1, len(self.ends))])
@@ -254,20 +254,20 @@ class ImpactLog(Stored):
         return table[np.lexsort((table["particle"], table["time"]))]
 
     def frame(self, **chosen: Any) -> "pandas.DataFrame":
-        """The same as a pandas frame, with columns x, y, z for the vectors' components; arguments as for `table`."""
+        """The rows of `table` as a pandas frame, with columns x, y, z for components; arguments as for `table`."""
         with needed_by("a frame of impacts", "table"):
             import pandas
         table = self.table(**chosen)
         return pandas.DataFrame(flattened({name: table[name] for name in self.dtype.names or ()}))
 
     def require_intact(self) -> None:
-        """Raise a SceneError that names what does not match its checksum."""
+        """Raise a SceneError that names the part that does not match its checksum."""
         with self._reading("its values"):
             self._checked.require_constants()
         self._require_sums(0, self._rows)
 
     def _require_sums(self, first: int, last: int) -> None:
-        """Raise a SceneError if rows of whole frames do not match their checksums."""
+        """Raise a SceneError if rows of complete frames do not match their checksums."""
         begins = np.append(0, self.ends)
         if not self._checked.has_any():
             return
@@ -279,14 +279,14 @@ class ImpactLog(Stored):
                     self._checked.compare_rows(f"impacts/{name}", column, k, (int(begins[k]), int(begins[k + 1])))
 
     def _is_collision(self, rows: slice) -> Any:
-        """Which rows are of two particles that meet: their wall is -1, as that of the first counter is."""
+        """Whether rows are collisions of two particles: these have the wall -1, like crossings of the first counter."""
         return self._columns["partner"][rows] >= 0 if "partner" in self._columns else np.False_
 
     def _surfaces(self) -> int:
         return int(self._surface.max()) + 1 if len(self._surface) else 0
 
     def _part(self, rows: slice, wanted: tuple[Any, Any, bool], span: tuple[float, float]) -> NDArray[Any]:
-        """The wanted ones of some rows."""
+        """Return the wanted rows among `rows`."""
         with self._reading(f"its rows from {rows.start} on"):
             time = finite(self._columns["time"][rows], "row")
             particle, wall = self._columns["particle"][rows], self._columns["wall"][rows]
@@ -323,12 +323,12 @@ def missing(file: Any) -> str | None:
 
 
 def _of_walls(values: NDArray[Any], wall: NDArray[np.integer], other: Any) -> NDArray[Any]:
-    """The value of the wall of each row, `other` where that is below 0: a scene without a surface has no wall."""
+    """The value of the wall of each row; `other` where the wall is below 0: a scene without a surface has no wall."""
     return np.append(values, other)[np.where(wall >= 0, wall, -1)]
 
 
 def _among(name: str, numbers: Any, n: int) -> NDArray[np.bool_]:
-    """Whether each of n is wanted."""
+    """A mask of the n numbers that are wanted."""
     if numbers is None:
         return np.ones(n, np.bool_)
     listed = numbers if isinstance(numbers, (Sequence, np.ndarray)) else [numbers]

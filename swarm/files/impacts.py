@@ -1,11 +1,11 @@
-"""Writing logs of impacts: rows are appended, and the number of frames that are complete is written last.
+"""Logs of impacts are written: rows are appended, and the number of complete frames comes last.
 
 impacts/{time,particle,wall,position,velocity_before,velocity_after,impulse}, one entry an impact, with friction also
-impacts/slip, impacts/image where the scene repeats, impacts/partner of balls, and impacts/{duration,largest_force,
-friction_loss} of contacts of grains; frames/complete (2,), how many frames are, and for these frames/{time,rows}, their
-times and how many rows there are at the end of each: what comes after them is of no use yet.
-walls/{surface,member} are what each number in impacts/wall stands for. parameters/{scene,method,kept} as TOML text,
-parameters/particles, their number, parameters/start, a digest of them at the start, and parameters/seed.
+impacts/slip, in a periodic scene impacts/image, impacts/partner of balls, and impacts/{duration,largest_force,
+friction_loss} of contacts of grains; frames/complete (2,), the number of complete frames, and frames/{time,rows}, their
+times and the numbers of rows until their ends: later rows are not valid yet.
+walls/{surface,member} tell the surface and member of each number in impacts/wall. parameters/{scene,method,kept} as
+TOML text, parameters/particles, their number, parameters/start, their digest at the start, and parameters/seed.
 """
 
 import json
@@ -25,10 +25,10 @@ from .layout import ARRAYS
 from .storage import Storage
 from .writer import WriteFrames, Written, descriptions
 
-# Rows of a chunk, some for each particle, within these bounds: larger ones are written sooner (of 10^4 particles
-# in half the time that those of 2^13 rows take), and a log of a few rows is a small file.
+# Rows of a chunk, a few for each particle, within these bounds: larger ones are written sooner (for 10^4 particles
+# in half the time of chunks of 2^13 rows), and a log of a few rows is a small file.
 _SMALLEST, _LARGEST = 1 << 10, 1 << 16
-# So many rows are gathered before they are written: a call for each column takes as long as some hundred of them.
+# Rows that are gathered before they are written: a call for each column takes as long as a few hundred of them.
 _SOME = 1 << 12
 
 Rows = dict[str, NDArray[Any]]
@@ -52,14 +52,14 @@ def about(compiled: CompiledScene, method: Method, kept: str, identity: dict[str
 
 
 class ImpactWriter(AppendedFile):
-    """A context that creates the log, or goes on with it, and gives the function that writes what frames add.
+    """A context that creates the log, or reopens it, and returns the function that writes the rows of frames.
 
     Args:
         path: the file.
         columns: name -> array without rows.
-        ends: frame -> rows at its end; what is written is taken out.
+        ends: frame -> number of rows until its end; written frames are removed.
         about: group/name -> text, number or array.
-        start: frames and rows of the file to go on with; None: a new file.
+        start: the numbers of frames and rows of the file to continue; None: a new file.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class ImpactWriter(AppendedFile):
         self._columns, self._ends, self._about = columns, ends, about
         self._frames, self._rows = start or (0, 0)
         self._few: list[Rows] = []
-        # Of the rows of the frame under way, by columns; of frames with all rows; None in an older file.
+        # Checksums of the rows of the frame under way, by columns, and of complete frames; None in an older file.
         self._sums: checksums.RowSums | None = None
         self._running = dict.fromkeys(columns, 0)
         self._whole: list[dict[str, int]] = []
@@ -81,8 +81,8 @@ class ImpactWriter(AppendedFile):
             self._find()
             if self._sums is not None:
                 self._go_on_from_rows()
-            # Rows of frames that are to be computed again are not cut off, which a kill may spoil, but written over;
-            # by several threads in another order, so that these frames are not complete from now on.
+            # Rows of frames that are computed again are not cut off, which a kill may spoil, but overwritten. Several
+            # threads write them in another order, so that these frames are not complete from now on.
             self._complete(self._frames)
         return self._write
 
@@ -104,7 +104,7 @@ class ImpactWriter(AppendedFile):
         checksums.RowSums.create(file, dict.fromkeys(names, (1, 0)), ["frames/complete"])
 
     def _go_on_from_rows(self) -> None:
-        """Begin with the rows of the frame under way that the file has."""
+        """Start the checksums with the rows of the frame under way that are in the file."""
         first = int(self._counts[self._frames - 1]) if self._frames else 0
         for begin in range(first, self._rows, _LARGEST):
             some = slice(begin, min(begin + _LARGEST, self._rows))
@@ -118,13 +118,13 @@ class ImpactWriter(AppendedFile):
         self._begin()
 
     def _complete(self, frames: int) -> None:
-        """Say how many frames are complete, after these are on file."""
+        """Write the number of complete frames, after these are in the file."""
         dataset = self._file["frames/complete"]
         put(dataset, 0, _counted(frames)[: len(dataset)])
         self._flush()
 
     def add(self, rows: Rows) -> None:
-        """Add rows; their arrays may be changed when it returns."""
+        """Add rows; their arrays may be changed after it returns."""
         if len(rows["time"]) < _SOME and sum(len(few["time"]) for few in self._few) < _SOME:
             self._few.append({name: array.copy() for name, array in rows.items()})
             return
@@ -144,7 +144,7 @@ class ImpactWriter(AppendedFile):
         self._rows += len(rows["time"])
 
     def _sum(self, rows: Rows) -> None:
-        """Go on with the checksums by rows that come next, up to the ends of frames that are among them."""
+        """Update the checksums with the next rows, up to the ends of frames among them."""
         if self._sums is None:
             return
         place, count = 0, len(rows["time"])
@@ -186,7 +186,7 @@ class ImpactWriter(AppendedFile):
         return "" if self._sums is None else json.dumps(self._running)
 
     def sync(self) -> None:
-        """Flush to the disk what was written."""
+        """Flush the written data to the disk."""
         with self._writing("impacts"):
             self._add_few()
             self._flush()
@@ -194,5 +194,5 @@ class ImpactWriter(AppendedFile):
 
 
 def _counted(frames: int) -> NDArray[np.int64]:
-    """How many frames are complete, and the checksum of that: they are written at once."""
+    """The number of complete frames and its checksum, which are written at once."""
     return np.array([frames, checksums.checksum_of(np.int64(frames))])

@@ -1,4 +1,4 @@
-"""The layout that a trajectory is checked for before it is read: datasets, their types, and consistent shapes."""
+"""The layout that a trajectory must have before it is read: datasets, their types, and consistent shapes."""
 
 import math
 from collections.abc import Callable, Collection
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from ..common.catalog import OBSERVABLES
 from .sources import DamagedError
 
-# Of each particle: its impacts, which files of older versions lack; the cells that it has come through, where the scene
-# repeats; when it has escaped [s], where walls have openings, and
-# when it was absorbed [s], where they may absorb it.
+# Data of each particle: its impacts, which files of older versions lack; the cells that it has crossed in periodic
+# scenes; its time of escape [s], where walls have openings;
+# its time of absorption [s], where walls may absorb it.
 PARTS, COUNTS, IMAGES, ESCAPES = ("position", "velocity"), "impacts", "image", "escape_time"
 ABSORBED = "absorbed_time"
-# When each ball was born [s], where these come during the run, NaN of those that are not.
+# The time of birth of each ball [s], where balls come during the run; NaN before its birth.
 BORN = "born_time"
-# Of balls: how often each has met another one, its spin where balls turn, and its radius, which stays.
+# Data of balls: the number of collisions, the spin where balls turn, and the constant radius.
 COLLISIONS, SPINS, RADII = "collisions", "spin", "radius"
 _INTEGER, _REAL, _NUMBER = "iu", "f", "iuf"
 _ELEMENTS: dict[str, tuple[str, tuple[int, ...]]] = {
@@ -32,19 +32,19 @@ UNIT = "swarm_unit"
 UNITS = {
     name: np.bytes_(unit) for name, unit in (("position", "m"), ("velocity", "m/s"), ("mass", "kg"), ("time", "s"))
 }
-# Those with values that may be in shards.
+# The datasets with values that may be in shards.
 JOINED = tuple(f"particles/all/{name}/value" for name in KEPT)
-# Of each particle of a run with sources: when it came [s], and the number of its source, -1 of those of the start.
+# For a run with sources: the time at which each particle came [s], and the number of its source, -1 from the start.
 BIRTHS = "birth_time", "birth_source"
-# Long arrays of the scene, by their digests.
+# The group of long arrays of the scene, by their digests.
 ARRAYS = "arrays"
 _TEXTS = ("scene", "method", "storage")
 _REQUIRED = ("h5md", *(f"parameters/{name}" for name in (*_TEXTS, "particles", "frame", "time")))
 # The highest compression of any HDF5 filter: deflate, 1032 to 1.
 _DENSEST = 1032
-# Bytes of the header of a heap of texts, and of each object in it; the signature of a heap.
+# Bytes of the header of a heap of texts, and of the header of each object in it; the signature of a heap.
 _HEADER, _HEAP = 16, b"GCOL"
-# The version of a heap, which follows its signature; and the bytes in which a writer puts the texts of attributes.
+# The version of a heap, which follows its signature; and the bytes of a file that hold the texts of attributes.
 _VERSION, _BEGINNING = b"\1\0\0\0", 1 << 20
 
 
@@ -54,7 +54,7 @@ def missing(file: Any) -> str | None:
 
 
 def frames(file: Any, path: Path) -> int:
-    """The number of complete frames of a file; a ValueError says what is inconsistent.
+    """Return the number of complete frames of a file; raise a ValueError about an inconsistent part.
 
     While a file is being written, a dataset may have more entries than there are complete frames, never fewer.
     """
@@ -85,9 +85,9 @@ def frames(file: Any, path: Path) -> int:
 
 
 def require_shards(file: Any, n: int, path: Path, open_file: Callable[[Path], Any]) -> None:
-    """Raise an error that names the file where one is missing or damaged that holds particles of n frames of this one.
+    """Raise an error that names a missing or damaged file of a shard with particles of the first n frames.
 
-    HDF5 would fill in zeros for what it does not find.
+    HDF5 would return zeros for data that it does not find.
     """
     held: dict[str, dict[str, int]] = {}
     for name in KEPT:
@@ -112,7 +112,7 @@ def require_shards(file: Any, n: int, path: Path, open_file: Callable[[Path], An
 
 
 def _require_particles(file: Any, n: int, count: int, path: Path) -> None:
-    """Raise a ValueError if what is kept of the `count` particles in n frames is inconsistent."""
+    """Raise a ValueError if the data of the `count` particles in n frames are inconsistent."""
     kept = dataset(file, "particles/all/mass", _REAL, (None,))
     if not 1 <= len(kept) <= count:
         raise ValueError(f"particles/all/mass must have 1 to {count} entries, got {len(kept)}")
@@ -138,7 +138,7 @@ def require_index(file: Any) -> None:
 
 
 def text(dataset: Any, path: Path) -> str:
-    """A text of the file; a ValueError if it is damaged.
+    """Read a text of the file; raise a ValueError if it is damaged.
 
     HDF5 keeps texts in a heap without a checksum, and never returns from reading a damaged one, so the heap is checked
     first. HDF5 File Format Specification, III.E and VIII: a text is its length, the address of its heap and an object
@@ -154,7 +154,7 @@ def text(dataset: Any, path: Path) -> str:
 
 
 def require_heaps(path: Path) -> None:
-    """Raise a ValueError if a heap of texts at the beginning of a file is damaged, where those of attributes are."""
+    """Raise a ValueError if a heap of texts at the beginning of a file, which holds those of attributes, is damaged."""
     with open(path, "rb") as file:
         head, begin = file.read(_BEGINNING), -1
         while (begin := head.find(_HEAP + _VERSION, begin + 1)) >= 0:
@@ -178,12 +178,12 @@ def _require_heap(file: IO[bytes], begin: int) -> None:
 
 
 def require_observables(seen: dict[str, NDArray[Any]], own: Collection[str], lengths: dict[str, int]) -> None:
-    """Raise a ValueError if an observable of every run is missing, or one has another shape than it should.
+    """Raise a ValueError if an observable of every run is missing, or an observable has a wrong shape.
 
     Args:
         seen: the observables by their names, one entry a frame.
-        own: the names of those of the user.
-        lengths: the lengths of axes of `catalog.OBSERVABLES` that are known.
+        own: the names of the user's observables.
+        lengths: the known lengths of axes of `catalog.OBSERVABLES`.
     """
     n = len(seen["time"])
     for name, one in OBSERVABLES.items():
@@ -196,7 +196,7 @@ def require_observables(seen: dict[str, NDArray[Any]], own: Collection[str], len
 
 
 def dataset(file: Any, name: str, kinds: str | None = None, shape: tuple[int | None, ...] | None = None) -> Any:
-    """A dataset of one of these kinds and of this shape; None is any length, and the first axis may be longer."""
+    """Return a dataset of these kinds and this shape; None is any length, and the first axis may be longer."""
     found = file[name]
     if not isinstance(found, h5py.Dataset) or found.shape is None:
         raise ValueError(f"{name} must be a dataset")
@@ -210,7 +210,7 @@ def dataset(file: Any, name: str, kinds: str | None = None, shape: tuple[int | N
 
 
 def _is_of(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
-    """Whether a shape is the wanted one, in which None is any length."""
+    """Whether a shape is the wanted one; None in it is any length."""
     return len(shape) == len(wanted) and all(k in (length, None) for length, k in zip(shape, wanted, strict=True))
 
 
@@ -219,7 +219,7 @@ def _shown(shape: tuple[int | None, ...]) -> str:
 
 
 def require_fits(dataset: Any, rows: int, path: Path) -> None:
-    """Raise a ValueError if the file is too small for so many rows, before memory is allocated for them."""
+    """Raise a ValueError if the file is too small for this number of rows, before memory is allocated for them."""
     if dataset.is_virtual:
         return  # `require_shards` looks at the files that hold them
     size, packed = path.stat().st_size, dataset.id.get_create_plist().get_nfilters() > 0

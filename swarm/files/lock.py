@@ -1,4 +1,4 @@
-"""Only one run writes a file: the lock of another beside it, which the system releases when a process ends."""
+"""Locks: only one run writes a file. The system releases the lock of a file beside it when a process ends."""
 
 import contextlib
 from collections.abc import Iterator
@@ -10,9 +10,9 @@ from . import paths
 
 @contextlib.contextmanager
 def only_writer(target: Path, what: str = "trajectory", patience: float = 0.0) -> Iterator[None]:
-    """Hold the lock of a file that a run writes, after `patience` [s] at the latest.
+    """Hold the lock of a file that a run writes; wait for it up to `patience` [s].
 
-    A file beside it is locked, since a lock on the file itself would block readers. A lock file that is left by a
+    A file beside it is locked, since a lock on the file itself would block readers. A lock file left by a
     killed run blocks no later run.
 
     Raises:
@@ -35,7 +35,7 @@ def only_writer(target: Path, what: str = "trajectory", patience: float = 0.0) -
     try:
         yield
     finally:
-        # Removed while locked: a process that has it open notices that its name is gone, and opens a new one. Windows
+        # Removed while locked: a process that waits for it notices that its name is gone, and opens a new one. Windows
         # cannot remove an open file: there filelock removes it later.
         with contextlib.suppress(OSError):
             path.unlink(missing_ok=True)
@@ -43,7 +43,7 @@ def only_writer(target: Path, what: str = "trajectory", patience: float = 0.0) -
 
 
 def is_written(target: Path) -> bool:
-    """Whether a run writes this file now: it holds the lock beside it."""
+    """Whether a run writes this file now and holds the lock beside it."""
     lock = paths.lock_of(target)
     if not lock.exists():
         return False

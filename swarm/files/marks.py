@@ -12,12 +12,12 @@ from . import paths
 from .replaced import replaced
 
 _ALLOW = "overwrite it (--overwrite, overwrite=True)"
-# Bytes at the beginning of a file in which its mark is.
+# Bytes at the beginning of a file that contain its mark.
 _HEAD = 4096
 # The entry of the metadata of a picture that names the program that drew it, by the suffix.
 _DRAWN_BY = {".png": "Software", ".pdf": "Creator", ".svg": "Creator"}
 _PROGRAM, _HDF5 = "swarm", b"\x89HDF\r\n\x1a\n"
-# What is said where one of these has a name of another format: of `_FORMATS`, or one that is not written.
+# The hint for a name with the suffix of another format: one of `_FORMATS`, or one that is not written.
 _HDF5_FILES = {
     "trajectory": "it is HDF5; write other formats of it after the run: swarm export RUN.h5 -o RUN.csv (or .vtkhdf, "
     ".xyz, .gsd, .ply, .obj)",
@@ -29,20 +29,20 @@ _COLUMNS_OF_TABLE = {"file", "state", "error", "wall_time"}
 
 
 def of_picture(path: Path) -> dict[str, Any]:
-    """The metadata by which a picture, of a suffix that matplotlib writes, is known as one of swarm."""
+    """The metadata that identify a picture, of a suffix that matplotlib writes, as one of swarm."""
     return {_DRAWN_BY[path.suffix.lower()]: f"{_PROGRAM} {VERSION}"}
 
 
 def check_target(path: Path, overwrite: bool, what: str = "trajectory", allow: str = _ALLOW) -> None:
-    """Raise a SceneError if `path` cannot become a new file, or replace the one that is there.
+    """Raise a SceneError if `path` cannot become a new file, or replace the existing one.
 
-    A file is replaced only by one of its own kind, which its content says.
+    A file is replaced only by one of its own kind, which its content tells.
 
     Args:
         path: the file.
         overwrite: whether an existing file may be replaced.
         what: the output; its kind is one of `_KINDS` or, by its suffix, of `_FORMATS`.
-        allow: how an existing file may be replaced, for the sentence.
+        allow: the way to replace an existing file, for the sentence.
     """
     overwrite = flag("overwrite", overwrite)
     paths.check_place(path, what)
@@ -57,10 +57,10 @@ def check_target(path: Path, overwrite: bool, what: str = "trajectory", allow: s
 
 
 def write(path: Path, content: bytes, what: str, overwrite: bool = False) -> Path:
-    """Write a file, whole or not at all, in place of one of its own kind where it may be replaced; returns its path.
+    """Write a file, whole or not at all, in place of one of its own kind if that may be replaced; return its path.
 
     Raises:
-        SceneError: it exists and may not be replaced, or no file can be there.
+        SceneError: it exists and may not be replaced, or its place is not possible.
         FileError: it cannot be written.
     """
     target = paths.target_of(what, path)
@@ -81,7 +81,7 @@ def require_own(path: Path, what: str) -> None:
 
 
 def why_not(path: Path, what: str) -> str | None:
-    """What a file had to be to be replaced by `what`, such as "a trajectory of swarm"; None if it is that, or empty.
+    """The kind of file that `what` replaces, such as "a trajectory of swarm"; None if `path` is of it, or is empty.
 
     A file that cannot be read counts as one of another kind.
     """
@@ -111,7 +111,7 @@ def _holds(pattern: bytes) -> Callable[[Path], bool]:
 
 
 def _is_trajectory(path: Path) -> bool:
-    """Whether it is a trajectory, by its structure and the attribute that names its maker."""
+    """Whether a file is a trajectory, by its structure and the attribute that names its maker."""
     from . import layout, provenance
 
     return _of_hdf5(path, lambda file: layout.missing(file) is None and provenance.is_own(file), b"h5md")
@@ -124,7 +124,7 @@ def _is_log(path: Path) -> bool:
 
 
 def _of_hdf5(path: Path, holds: Callable[[Any], bool], name: bytes) -> bool:
-    """Whether an HDF5 file holds what it should; of a damaged one its beginning must have the names of its parts."""
+    """Whether `holds` is true of an HDF5 file; of a damaged file, whether its beginning has the names of its parts."""
     from .sources import DAMAGE, DamagedError
     from .stored import open_stored
 
@@ -148,7 +148,7 @@ def _is_vtkhdf(path: Path) -> bool:
 
 
 def _is_pdf(path: Path) -> bool:
-    """Whether its information, which may be anywhere in it, names swarm as its creator."""
+    """Whether the information of a PDF, which may be anywhere in it, names swarm as its creator."""
     content = path.read_bytes()
     return content.startswith(b"%PDF") and f"/Creator ({_PROGRAM} ".encode() in content
 
@@ -161,7 +161,7 @@ def is_table(path: Path) -> bool:
     return set(head.partition(b"\n")[0].decode("utf-8", "replace").split(",")) >= _COLUMNS_OF_TABLE
 
 
-# By what the output is; where it is not here, by its suffix.
+# Kinds by the name of the output; outputs that are not listed have kinds by suffix.
 _KINDS: dict[str, tuple[str, Callable[[Path], bool]]] = {
     "trajectory": ("a trajectory of swarm", _is_trajectory),
     "impacts": ("a log of impacts of swarm", _is_log),

@@ -1,4 +1,4 @@
-"""The origin of files with float32 numbers: with seven digits, particles far from 0 would be at one place."""
+"""The origin of files with float32 numbers: with seven digits, particles far from 0 would coincide."""
 
 import numpy as np
 
@@ -7,14 +7,14 @@ from ..particles import Particles
 from ..scene import Scene
 from ..state import Floats
 
-# Of the width of a scene, how far from 0 it may be: float32 rounds positions to 4e-6 of the width there.
+# The largest distance of a scene from 0, in widths of it: float32 rounds positions to 4e-6 of the width there.
 _FAR = 64.0
 
 
 def origin_of(scene: Scene, start: Particles) -> Floats:
-    """The centre (3,) of a scene [m], or 0 where it is no farther from there than a few dozen times its width.
+    """The centre (3,) of a scene [m], or 0 if it is at most a few dozen widths of the scene from 0.
 
-    In a direction in which it is open, its centre is that of the particles at the start.
+    In a direction in which the scene is open, the centre of the particles at the start is used.
     """
     low, high = (np.array(corner) for corner in scene.bounds())
     there = start.position[:, ~np.isnan(start.position[0])]
@@ -29,7 +29,7 @@ def origin_of(scene: Scene, start: Particles) -> Floats:
 
 
 def require_near(scene: Scene, start: Particles) -> None:
-    """Raise a `SceneError` where positions in float32 would be too coarse: a trajectory has no origin of its own."""
+    """Raise a `SceneError` if positions in float32 would be too coarse: a trajectory has no origin of its own."""
     center = origin_of(scene, start)
     if center.any():
         off = float(np.spacing(np.float32(np.abs(center).max())))

@@ -14,7 +14,7 @@ _OURS = "swarm-"
 
 
 def target_of(name: str, value: Any) -> Path:
-    """The argument `name` as the path of a file to write: a symbolic link is resolved.
+    """Return the argument `name` as the path of a file to write, with a symbolic link resolved.
 
     Raises:
         SceneError: it is not a path.
@@ -24,7 +24,7 @@ def target_of(name: str, value: Any) -> Path:
 
 
 def target_of_run(name: str, value: Any) -> Path:
-    """As `target_of`, for a run, which has files of longer names beside it.
+    """Return `target_of` for a run, which has files of longer names beside it.
 
     Raises:
         SceneError: it is not a path, or a name is too long for the system.
@@ -45,12 +45,12 @@ def shards_of(trajectory: Path) -> Path:
 
 
 def is_temporary(name: str) -> bool:
-    """Whether a file of this name is one that swarm has made for as long as it runs."""
+    """Whether a file name is that of a temporary file of swarm."""
     return name.startswith(".") and f".{_OURS}" in name
 
 
 def lock_of(path: Path) -> Path:
-    """The file of the lock that a run holds while it writes another."""
+    """The lock file that a run holds while it writes a file."""
     return path.with_name(f".{path.name}.{_OURS}lock")
 
 
@@ -60,7 +60,7 @@ def part_of(path: Path) -> Path:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is a file; also of a text that cannot be the name of one."""
+    """Whether a path is a file; a text that cannot be the name of one is not."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -77,7 +77,7 @@ def identity(path: Path) -> tuple[int, int] | None:
 
 
 def check_place(path: Path, what: str) -> None:
-    """Raise a SceneError if no file can be at `path`: its folder is not there, or something else is."""
+    """Raise a SceneError if no file can be at `path`: its folder does not exist, or it is no regular file."""
     try:
         if not path.parent.is_dir():
             raise SceneError(f"{what}: the folder {path.parent} does not exist; create it first")
@@ -93,7 +93,7 @@ def check_place(path: Path, what: str) -> None:
 
 
 def check_distinct(outputs: dict[str, Path | None], inputs: dict[str, Path | None]) -> None:
-    """Raise a SceneError if an output is an input, or two outputs are the same file; the keys say what each is."""
+    """Raise a SceneError if an output is an input, or two outputs are the same file; the keys name the files."""
     seen = [(what, path) for what, path in inputs.items() if path is not None]
     for what, path in ((what, path) for what, path in outputs.items() if path is not None):
         for other, there in seen:

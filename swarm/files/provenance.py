@@ -1,4 +1,4 @@
-"""How a trajectory came to be: its end, its threads and its pace, and the versions of what made it."""
+"""The origin of a trajectory: its end, its threads and its pace, and the versions of the software."""
 
 import datetime
 import functools
@@ -18,7 +18,7 @@ _CPUS = Path("/proc/cpuinfo")
 
 
 class Course(NamedTuple):
-    """A run as it is carried out: its end [s], its threads, and the seconds that it has taken so far."""
+    """A run as it is carried out: its end [s], its threads, and a clock of the seconds so far."""
 
     until: float
     threads: int
@@ -26,7 +26,7 @@ class Course(NamedTuple):
 
 
 def makers() -> dict[str, str]:
-    """What makes a trajectory, and when, for the attributes of h5md/creator."""
+    """The software that makes a trajectory, and the date, for the attributes of h5md/creator."""
     import h5py
     import numpy
 
@@ -44,9 +44,9 @@ def makers() -> dict[str, str]:
 
 @functools.cache
 def _numba() -> str:
-    """The version of Numba, without its import: by the name of the folder beside it.
+    """The version of Numba, without its import: from the name of the folder beside it.
 
-    `importlib.metadata` imports what parses mails for it, which takes 20 ms.
+    `importlib.metadata` imports a parser of mails, which takes 20 ms.
     """
     found = importlib.machinery.PathFinder.find_spec("numba")
     beside = Path(str(found.origin)).parents[1].glob("numba-*.dist-info") if found else iter(())
@@ -60,7 +60,7 @@ def _numba() -> str:
 
 @functools.cache
 def _processor(file: Path) -> str:
-    """The name of the processor in a file of the system, or of its kind."""
+    """The name of the processor in a file of the system, or the kind of machine."""
     try:
         models = [line.partition(":")[2].strip() for line in file.read_text().splitlines() if "model name" in line]
     except OSError:
@@ -69,15 +69,15 @@ def _processor(file: Path) -> str:
 
 
 def is_own(file: Any) -> bool:
-    """Whether a file says that swarm made it."""
+    """Whether the attributes of a file say that swarm made it."""
     return _CREATOR in file and file[_CREATOR].attrs.get("name") == _NAME
 
 
 def creator_of(file: Any) -> dict[str, str]:
-    """The attributes of h5md/creator, which are texts; fewer of older versions.
+    """The attributes of h5md/creator, which are texts; files of older versions have fewer.
 
     Raises:
-        ValueError: one is not a text in one line, or the date is no date.
+        ValueError: one is not a text in one line, or the date is invalid.
     """
     found = dict(file[_CREATOR].attrs) if _CREATOR in file else {}
     for name, value in found.items():

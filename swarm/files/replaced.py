@@ -11,12 +11,12 @@ from ..errors import FileError, SwarmError
 from . import paths
 from .sources import cause
 
-# Bytes that say whether a disk is full.
+# Bytes that are enough to tell whether a disk is full.
 _BLOCK = 1 << 16
 
 
 def no_room(path: Path | None, room: int = _BLOCK) -> str:
-    """What the system says if so many bytes more cannot be written to a file, which libraries do not tell; else ""."""
+    """The system's message if `room` more bytes cannot be written to a file, which libraries do not report; else ""."""
     if path is None:
         return ""
     try:
@@ -34,7 +34,7 @@ def no_room(path: Path | None, room: int = _BLOCK) -> str:
 
 @contextlib.contextmanager
 def replaced(path: Path, what: str) -> Iterator[IO[bytes]]:
-    """A file to write in place of `path`, which takes its name at the end.
+    """Open a file that replaces `path` at the end of the context.
 
     Raises:
         FileError: it cannot be written.
@@ -60,13 +60,13 @@ def replaced(path: Path, what: str) -> Iterator[IO[bytes]]:
 
 @contextlib.contextmanager
 def together(target: Path, files: Sequence[Path], stale: Sequence[Path] = ()) -> Iterator[list[Path]]:
-    """The names under which others write files, which get their own when all are whole, and are removed else.
+    """Return temporary names for files, which get their own names when all are complete, and are removed on an error.
 
-    They are in a hidden folder beside `target`, which what is killed leaves, and the next one removes. Then the files
-    of these names, and those that are `stale`, are replaced.
+    They are in a hidden folder beside `target`, which a killed process leaves and the next one removes. At the end the
+    old files of these names, and the `stale` ones, are replaced.
 
     Raises:
-        FileError: they cannot be written; the old ones are there.
+        FileError: they cannot be written; the old files are kept.
     """
     folder = paths.part_of(target)
     parts = [folder / one.name for one in files]
@@ -81,7 +81,7 @@ def together(target: Path, files: Sequence[Path], stale: Sequence[Path] = ()) ->
     except SwarmError:
         raise
     except (OSError, RuntimeError) as error:
-        # HDF5's and gsd's own errors do not always say why.
+        # Errors of HDF5 and gsd do not always state the cause.
         begun = next((one for one in reversed(parts) if one.is_file()), None)
         full = "" if getattr(error, "errno", None) else no_room(begun)
         raise FileError(f"cannot write {target}: {full or cause(error)}") from error
@@ -92,7 +92,7 @@ def together(target: Path, files: Sequence[Path], stale: Sequence[Path] = ()) ->
 
 @contextlib.contextmanager
 def named_when_whole(target: Path) -> Iterator[Path]:
-    """The name under which others write one file; as `together`."""
+    """Return a temporary name for one file; see `together`."""
     with together(target, [target]) as (part,):
         yield part
 
@@ -105,10 +105,10 @@ def _remove(folder: Path) -> None:
 
 
 def _exchange(parts: Sequence[Path], files: Sequence[Path], old: Sequence[Path], folder: Path) -> None:
-    """Give files their names, after the old ones are set aside; all of them, or on an error none.
+    """Give files their names after the old ones are set aside; on an error no file changes.
 
     The last file gets its name first. If the process is killed meanwhile, a sequence lacks its beginning, and no file
-    in between.
+    in the middle.
     """
     aside = folder / "old"
     aside.mkdir()

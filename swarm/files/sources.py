@@ -1,4 +1,4 @@
-"""Errors of files that are read, missing, of another kind or damaged."""
+"""Errors of input files that are missing, of another kind or damaged."""
 
 import errno
 import os
@@ -8,16 +8,16 @@ from pathlib import Path
 
 from ..errors import SceneError
 
-# What h5py, NumPy, tomllib, msgspec and swarm itself raise for a damaged file. KeyError and IndexError are
+# Exceptions that h5py, NumPy, tomllib, msgspec and swarm itself raise for a damaged file. KeyError and IndexError are
 # LookupErrors; SceneError, UnicodeDecodeError and TOMLDecodeError are ValueErrors; RecursionError is a
 # RuntimeError.
 DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, ArithmeticError, MemoryError)
 
-# What the system says of a full disk, and of a user's part of it.
+# The system's messages for a full disk, and for a full quota of a user.
 _FULL = {os.strerror(number) for number in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))}
 
 
-# Which commands take files of a suffix, and the folder of a sweep.
+# The commands that take files of a suffix, and those for the folder of a sweep.
 _COMMANDS = {
     ".toml": "swarm check says what a scene file will do, and swarm run carries it out",
     ".h5": "swarm info says what a trajectory holds, swarm plot draws it, and swarm record makes its recording",
@@ -31,7 +31,7 @@ class DamagedError(SceneError):
 
 
 def commands_for(path: Path, needed: str = "") -> str:
-    """The end of a sentence about a path that is no file of the suffix `needed`: which command takes it, or ""."""
+    """The end of a sentence about a path without the suffix `needed`: the command that takes it, or ""."""
     suffix = path.suffix.lower()
     words = "" if suffix == needed else _COMMANDS.get(suffix, "")
     if path.is_dir():
@@ -57,7 +57,7 @@ def require_file(path: Path, expected: str) -> None:
 
 
 def cause(error: BaseException) -> str:
-    """The message of the system about a file that cannot be written, without names of parts and texts of HDF5."""
+    """The system's message about a file that cannot be written, without names of parts and texts of HDF5."""
     messages = re.findall(r"error message = '([^']*)'", str(error))
     number = getattr(error, "errno", None)
     message = os.strerror(number) if number else messages[-1] if messages else reason(error)

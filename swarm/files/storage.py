@@ -1,4 +1,4 @@
-"""The particles that a trajectory keeps, and their form."""
+"""The particles that a trajectory keeps, and the form of their numbers."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -33,7 +33,7 @@ class Storage(Validated):
         compression: "none", "gzip" (level 1, bytes shuffled), or "lzf", which is twice as fast.
 
     Raises:
-        SceneError: an argument has another value.
+        SceneError: an argument has an invalid value.
 
     >>> len(range(10)[Storage(frames=4).kept()])
     3
@@ -44,11 +44,11 @@ class Storage(Validated):
     compression: Compression = "none"
 
     def kept(self, first: int = 0) -> slice:
-        """The particles that it keeps, of those from number `first` on."""
+        """The slice of the kept particles among those from number `first` on."""
         if isinstance(self.frames, str):
             return slice(None) if self.frames == "all" else slice(0)
         return slice(-first % self.frames, None, self.frames)
 
     def bytes_of(self, n: int) -> int:
-        """Bytes that n particles take in a frame, if they are not compressed."""
+        """Bytes of n particles in a frame without compression."""
         return len(range(n)[self.kept()]) * (6 * np.dtype(self.precision).itemsize + np.dtype(np.int64).itemsize)

@@ -28,7 +28,7 @@ _STILL_WRITTEN = "already open"
 
 
 class Stored:
-    """A file on disk, a context that closes it; `what` it should be and the function that opens it are for errors."""
+    """A file on disk, as a context that closes it; `what` (the expected kind) and `opener` are for error sentences."""
 
     def __init__(self, path: str | Path, what: str, opener: str) -> None:
         self.path, self._opener = path_of("path", path), opener
@@ -60,7 +60,7 @@ class Stored:
 
     @contextlib.contextmanager
     def _reading(self, what: str) -> Iterator[Any]:
-        """The open file, for reading `what`; an error in that means that the file is damaged, and is a SceneError."""
+        """Return the open file, for reading `what`; an error is raised as a SceneError that says that it is damaged."""
         if not self._file:
             raise SceneError(f"{self.path} is closed; open it again with {self._opener}")
         try:
@@ -74,7 +74,7 @@ class Stored:
 
     @property
     def count(self) -> int:
-        """Number of particles, or of points of bodies, that were run; a file may keep fewer."""
+        """Number of particles, or of points of bodies, in the run; a file may keep fewer."""
         with self._reading("its number of particles"):
             return int(self._checked.constant("parameters/particles"))
 
@@ -101,7 +101,7 @@ class Stored:
 
     @property
     def scene(self) -> Scene:
-        """The scene that was run."""
+        """The scene of the run."""
         with self._reading("its scene") as file:
             table, arrays = parsed(self._text("scene")), file["parameters"].get(layout.ARRAYS, {})
             for name in arrays:
@@ -109,13 +109,13 @@ class Stored:
             surfaces = [tables.with_arrays(surface, arrays) for surface in table["surface"]]
             every = [one for surface in surfaces for one in _nested(surface)]
             own = any(surface["kind"] == "own" or plugins.is_named(surface["kind"]) for surface in every)
-        # An OwnSurface is not damage: the error says that no file holds it.
+        # An OwnSurface is no damage: the error says that no file holds it.
         with contextlib.nullcontext() if own else self._reading("its scene"):
             return tables.scene_of(surfaces, *map(table.get, ("gravity", "period", "plane", "pairs")))
 
     @property
     def method(self) -> Method:
-        """The method that was run; of a user-defined one its name alone."""
+        """The method of the run; a user-defined method is only its name."""
         with self._reading("its method"):
             return tables.method_by_name(parsed(self._text("method")))
 
@@ -124,7 +124,7 @@ class Stored:
             return name in file
 
     def _constant(self, name: str, kind: Callable[[Any], Any], missing: Any) -> Any:
-        """A constant of the run, of a kind; `missing` where the file has none of this name."""
+        """Return a constant of the run, converted by `kind`; `missing` if the file has none of this name."""
         with self._reading(f"its {name}") as file:
             return kind(self._checked.constant(f"parameters/{name}")) if f"parameters/{name}" in file else missing
 
@@ -134,20 +134,20 @@ class Stored:
 
 
 def parsed(text: str) -> dict[str, Any]:
-    """The table of a TOML text of a file.
+    """Parse a TOML text of a file.
 
-    A text that is too deep takes the recursion to its limit. Objects of h5py that were collected there could not give
-    back its lock, and the next thread that wants it would wait for ever; so nothing is collected meanwhile.
+    A deeply nested text takes the recursion to its limit. If objects of h5py were collected there, they could not give
+    back its lock, and the next thread to take it would wait for ever; so garbage collection is off meanwhile.
     """
     with uncollected():
         return tomllib.loads(text)
 
 
 def open_stored(path: Path) -> h5py.File:
-    """The file, open for reading.
+    """Open a file for reading.
 
     Raises:
-        SceneError: it cannot be read, or a part of it is in another file that is no shard of it.
+        SceneError: it cannot be read, or a part of it is in another file that is not one of its shards.
     """
     file, what = _opened(path), "its texts"
     try:
@@ -201,12 +201,12 @@ def is_log(path: Path) -> bool:
 
 
 def _joins(file: h5py.File) -> bool:
-    """Whether it has virtual datasets."""
+    """Whether a file has virtual datasets."""
     return bool(file.visititems(lambda _name, found: getattr(found, "is_virtual", False) or None))
 
 
 def _nested(table: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The table of a surface, and all tables nested in it: those of its openings and its parts."""
+    """The table of a surface, and all tables nested in it: those of its openings and parts."""
     yield table
     for key in tables.NESTED:
         for one in table.get(key, ()):
@@ -214,7 +214,7 @@ def _nested(table: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def in_order(times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The times of frames, if each is after the one before it."""
+    """Return the times of frames after a check that they ascend."""
     finite(times)
     if (np.diff(times) <= 0.0).any():
         raise ValueError(f"frame {int((np.diff(times) <= 0.0).argmax()) + 1} is not after the one before it")
@@ -222,7 +222,7 @@ def in_order(times: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def finite(values: Any, entry: str = "frame") -> NDArray[Any]:
-    """The values, one or more an entry, if they are finite: no run writes an infinity or a NaN."""
+    """Return the values, one or more an entry, after a check that they are finite, as those of all runs are."""
     wrong = ~np.isfinite(values)
     if wrong.any():
         first = int(np.argwhere(wrong)[0, 0])
@@ -231,7 +231,7 @@ def finite(values: Any, entry: str = "frame") -> NDArray[Any]:
 
 
 def whole(name: str, value: Any) -> int:
-    """`value` as an integer."""
+    """Return `value` as an integer."""
     try:
         if isinstance(value, (bool, np.bool_)):
             raise TypeError

@@ -1,8 +1,8 @@
-"""Clears the mark that HDF5 sets on a file that is open for writing.
+"""The mark that HDF5 sets on a file that is open for writing is cleared.
 
 In the mode for one writer and many readers (SWMR) HDF5 orders its writes so that every prefix of them is a valid file:
-a file that a killed run leaves can be read. (In the ordinary mode it cannot: a kill while a node of a B-tree is split
-loses half of it.) But HDF5 marks the file, and readers that do not ask for SWMR refuse a marked one, even after the
+a file of a killed run can be read. (In the ordinary mode it cannot: a kill while a node of a B-tree is split
+loses half of it.) But HDF5 marks the file, and readers that do not use SWMR refuse a marked one, even after the
 writer has ended. The mark is a byte of the superblock. Its layout is fixed: HDF5 File Format Specification, II.A,
 superblock version 3.
 """
@@ -27,7 +27,7 @@ def unmark(file: BinaryIO) -> bytes:
 
 
 def make_appendable(file: BinaryIO) -> None:
-    """Prepare a file that a killed run left for writing: clear the mark, and set the end of file to the real one.
+    """Prepare a file of a killed run for writing: clear the mark, and set the end of file to the real one.
 
     A flush writes the superblock last, so its end of file may lie before blocks in use, which HDF5 would overwrite.
     """
@@ -39,9 +39,9 @@ def make_appendable(file: BinaryIO) -> None:
 
 
 class Unmarked(io.FileIO):
-    """A file for h5py to read as if it had no mark.
+    """A file that h5py reads as if it had no mark.
 
-    A marked file can only be opened in SWMR mode, where HDF5 waits for the writer to complete what is damaged:
+    A marked file can only be opened in SWMR mode, where HDF5 waits for the writer to complete a damaged part:
     forever, if there is no writer.
     """
 
@@ -64,7 +64,7 @@ class Unmarked(io.FileIO):
         return self._offset
 
     def readinto(self, buffer: Any) -> int:
-        """Read from the offset; the superblock is without its mark."""
+        """Read from the offset; the superblock has no mark."""
         at, view = self._offset, memoryview(buffer)
         # Forked processes share the offset of a file.
         data = os.pread(self.fileno(), len(view), at) if hasattr(os, "pread") else super().read(len(view)) or b""

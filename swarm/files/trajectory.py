@@ -1,16 +1,16 @@
 """Trajectories: HDF5 in the H5MD 1.1 layout (https://www.nongnu.org/h5md/h5md.html), read on demand.
 
-particles/all/{position,velocity,impacts}/{step,time,value}, value (frames, N, 3), of impacts (frames, N), since the
-start; where the scene repeats also particles/all/image, (frames, N, 3), and particles/all/box/edges, (frames, 3); where
-walls have openings particles/all/escape_time, (frames, N) [s], NaN of those inside, and where they may absorb also
-absorbed_time; of balls particles/all/radius (N,), particles/all/collisions (frames, N), and where they turn
+particles/all/{position,velocity,impacts}/{step,time,value}, value (frames, N, 3), for impacts (frames, N) since the
+start; in a periodic scene also particles/all/image, (frames, N, 3), and particles/all/box/edges, (frames, 3); where
+walls have openings particles/all/escape_time, (frames, N) [s], NaN inside, and where walls may absorb also
+absorbed_time; for balls particles/all/radius (N,), particles/all/collisions (frames, N), and where they turn
 particles/all/spin (frames, N, 3) [rad/s]; particles/all/{mass,id} (N,), and
-of a run with sources particles/all/{birth_time,birth_source} (N,); positions and velocities are NaN until the birth;
-observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text, parameters/particles, the
-number that were run, parameters/start, a digest of them at the start, parameters/seed, of thermal walls, and
+for a run with sources particles/all/{birth_time,birth_source} (N,); positions and velocities are NaN until the birth;
+observables/NAME/{step,time,value}; parameters/{scene,method,storage,scene_file} as TOML text; parameters/particles,
+their number in the run, parameters/start, their digest at the start, parameters/seed, of thermal walls, and
 parameters/observables, the names of user-defined observables, if there are any; parameters/{until,threads}, and
-parameters/wall_time (frames,) [s], the seconds that the run had taken, but of runs on clusters. Of bodies:
-parameters/body, the table of one as TOML text, parameters/copies, their number n, and connectivity/bonds (B n, 2);
+parameters/wall_time (frames,) [s], the wall time of the run so far, except for runs on clusters. For bodies:
+parameters/body, the table of a body as TOML text, parameters/copies, their number n, and connectivity/bonds (B n, 2);
 point p of copy i is particle p n + i. All elements share one step and one time dataset by hard links. writer.py
 writes it.
 """
@@ -50,13 +50,13 @@ class Trajectory(Stored):
     """A trajectory on disk, read on demand.
 
     Attributes:
-        times: (frames,) [s].
+        times: (frames,) the times of the frames [s].
         observables: name -> array, one entry a frame.
-        scene, method: as they were run.
-        scene_text: the scene file's text, or None.
+        scene, method: those of the run.
+        scene_text: the text of the scene file, or None.
         body, copies: the body that was run in copies, and their number; None and 0 for particles.
 
-    A file that is being written, or that a killed run left, can be read: the frames that are complete when it is
+    A file that a run is writing, or that a killed run left, can be read up to the frames that are complete when it is
     opened. Inconsistent content raises a SceneError that names the damaged part.
 
     >>> import swarm, tempfile
@@ -132,7 +132,7 @@ class Trajectory(Stored):
         return Observables(time=self.times, **self.observables_of(slice(self._frames)))
 
     def observables_of(self, some: slice) -> dict[str, NDArray[Any]]:
-        """All observables of some frames but their times."""
+        """The observables of a slice of frames, without their times."""
         seen, own = {}, self.own_observables
         with self._reading("its observables") as file:
             group = file.get("observables", {})
@@ -150,8 +150,8 @@ class Trajectory(Stored):
     def members(self, k: int = -1) -> dict[str, list[NDArray[Any]]]:
         """The sums of each member of each surface until frame k; {} for a run without member_impacts=True.
 
-        "impacts", and "residence" [s], "heat" [J] and "absorbed" where walls hold, heat or absorb particles: a list
-        with an array for each surface, as `Result.member_impacts`.
+        "impacts", and where walls hold, heat or absorb particles "residence" [s], "heat" [J] and "absorbed": a list
+        with an array for each surface, as in `Result.member_impacts`.
         """
         k = self._number_of(k)
         with self._reading("its members") as file:
@@ -162,7 +162,7 @@ class Trajectory(Stored):
         }
 
     def observed(self) -> dict[str, NDArray[Any]]:
-        """The observables, checked to include those of every run."""
+        """The observables, after a check that those of every run are among them."""
         seen, scene = self.observables, self.scene
         with self._reading("its observables"):
             lengths = {"surface": len(scene.surfaces), "part": len(scene.parts), "counter": len(self.counters)}
@@ -170,7 +170,7 @@ class Trajectory(Stored):
         return seen
 
     def require_frames(self) -> None:
-        """Raise a SceneError if there is no frame."""
+        """Raise a SceneError if the file has no frame."""
         if not len(self):
             raise SceneError(f"{self.path} holds no frame: its run ended before the first one was written")
 
@@ -180,14 +180,14 @@ class Trajectory(Stored):
             layout.require_index(file)
 
     def require_intact(self, frames: int | None = None) -> None:
-        """Raise a SceneError that names what does not match its checksum, of all, or of so many frames."""
+        """Raise a SceneError that names a part that differs from its checksum, in all or the first `frames` frames."""
         with self._reading("its values"):
             self._checked.require_intact(self._frames if frames is None else frames)
 
     def frame(self, k: int) -> Particles:
         """The particles at frame k; negative k count from the end.
 
-        Particles that are born later have positions and velocities of NaN: see `born`.
+        Particles that are born later have NaN as positions and velocities: see `born`.
         """
         k = self._number(k)
         with self._reading(f"frame {k}") as file:
@@ -205,14 +205,14 @@ class Trajectory(Stored):
             return found
 
     def born(self, k: int) -> NDArray[np.bool_]:
-        """Whether each of the particles of frame k was born by then, (N,)."""
+        """Whether each particle of the file is born by frame k, (N,)."""
         k = self._number(k)
         with self._reading(f"frame {k}") as file:
             born = self._there(file, k)
             return np.ones(len(file["particles/all/mass"]), np.bool_) if born is None else born
 
     def columns(self, k: int) -> dict[str, NDArray[Any]]:
-        """The columns of frame k as they are on file, a row a particle: "position", "velocity", "impacts", ..."""
+        """The columns of frame k in the file, a row a particle: "position", "velocity", "impacts", ..."""
         k = self._number(k)
         with self._reading(f"frame {k}") as file:
             everything = file["particles/all"]
@@ -248,14 +248,14 @@ class Trajectory(Stored):
         return bodies
 
     def impacts(self, k: int) -> NDArray[np.int64]:
-        """Number of impacts of each of the particles of frame k since the start, (N,)."""
+        """Number of impacts of each particle of frame k since the start, (N,)."""
         k, name = self._number(k), f"particles/all/{layout.COUNTS}"
         if not self._has(name):
             raise SceneError(f"{self.path} keeps no impacts of particles: an older version wrote it; run it again")
         return self._counts(k, layout.COUNTS)
 
     def collisions(self, k: int) -> NDArray[np.int64]:
-        """How often each of the balls of frame k has met another one since the start, (N,).
+        """Number of collisions of each ball of frame k with others since the start, (N,).
 
         Raises:
             SceneError: the particles have no radius.
@@ -273,11 +273,11 @@ class Trajectory(Stored):
         return np.asarray(counts)
 
     def escape_times(self, k: int) -> NDArray[np.float64]:
-        """Times at which the particles of frame k have passed an opening of a wall [s], (N,); NaN of those inside."""
+        """Times at which the particles of frame k have passed an opening of a wall [s], (N,); NaN inside."""
         return self._ends(k, layout.ESCAPES)
 
     def absorbed_times(self, k: int) -> NDArray[np.float64]:
-        """Times at which walls have absorbed the particles of frame k [s], (N,); NaN of those that are not."""
+        """Times at which walls have absorbed the particles of frame k [s], (N,); NaN for the others."""
         return self._ends(k, layout.ABSORBED)
 
     def _ends(self, k: int, kind: str) -> NDArray[np.float64]:
@@ -290,7 +290,7 @@ class Trajectory(Stored):
         return np.asarray(times)
 
     def _number(self, k: int) -> int:
-        """The number of a frame with particles, from 0 on."""
+        """The number, from 0 on, of a frame of a file with particles."""
         k = self._number_of(k)
         self._require_particles()
         return k
@@ -333,7 +333,7 @@ class Trajectory(Stored):
         return np.asarray(self._births(file) <= float(self._checked.row("parameters/time", k)))
 
     def _of_frame(self, name: str, k: int) -> NDArray[Any]:
-        """The values of the particles at frame k with a name, checked."""
+        """The values of the particles at frame k in the column `name`, after their checks."""
         return np.asarray(self._checked.row(f"particles/all/{name}/value", k))
 
     # --- What is the same in all frames ------------------------------------------------------------------
@@ -344,7 +344,7 @@ class Trajectory(Stored):
 
     @staticmethod
     def _is_of_balls(file: Any) -> bool:
-        """Whether it keeps of each frame which balls were born by then."""
+        """Whether the file tells for each frame which balls are born by then."""
         return f"particles/all/{layout.BORN}" in file
 
     def _births(self, file: Any) -> NDArray[np.float64]:
@@ -353,13 +353,13 @@ class Trajectory(Stored):
         return np.asarray(self._checked.constant(f"particles/all/{layout.BIRTHS[0]}"))
 
     def has_births(self) -> bool:
-        """Whether particles come during the run."""
+        """Whether the run has particles that come during it."""
         with self._reading("the births of its particles") as file:
             return self._comes(file)
 
     @property
     def radius(self) -> NDArray[np.float64] | None:
-        """The radii of the particles that the file keeps [m], (N,); None of points."""
+        """The radii of the particles in the file [m], (N,); None for points."""
         if not self._has(f"particles/all/{layout.RADII}"):
             return None
         with self._reading("the radii of its particles"):
@@ -367,9 +367,9 @@ class Trajectory(Stored):
 
     @property
     def birth_time(self) -> NDArray[np.float64]:
-        """When each of the particles that the file keeps comes [s], (N,); 0 of those of the start.
+        """The time at which each particle of the file comes [s], (N,); 0 for particles of the start.
 
-        NaN of balls that were not born by the last frame.
+        NaN for balls that were not born by the last frame.
         """
         with self._reading("the births of its particles") as file:
             if not self._comes(file):
@@ -379,7 +379,7 @@ class Trajectory(Stored):
 
     @property
     def birth_source(self) -> NDArray[np.int64]:
-        """The number of the source of each of them, (N,); -1 of those of the start."""
+        """The number of the source of each particle of the file, (N,); -1 for particles of the start."""
         with self._reading("the sources of its particles") as file:
             if not self._comes(file):
                 return np.full(len(file["particles/all/mass"]), -1)
@@ -387,7 +387,7 @@ class Trajectory(Stored):
 
     @property
     def ids(self) -> NDArray[np.int64]:
-        """The numbers of the particles that the file keeps, (N,)."""
+        """The numbers of the particles in the file, (N,)."""
         self._require_particles()
         with self._reading("the numbers of its particles"):
             ids = self._checked.constant("particles/all/id").astype(np.int64)
@@ -444,7 +444,7 @@ class Trajectory(Stored):
 
     @property
     def until(self) -> float | None:
-        """The end that the run was to reach [s]; None in files of older versions, and of runs on clusters."""
+        """The end time of the run [s]; None in files of older versions, and for runs on clusters."""
         found: float | None = self._constant("until", lambda end: float(finite(end)), None)
         return found
 
@@ -456,7 +456,7 @@ class Trajectory(Stored):
 
     @property
     def wall_times(self) -> NDArray[np.float64] | None:
-        """The seconds that the run had taken in all its sessions when each frame was written; None as for `until`."""
+        """The wall time of the run in all its sessions at the writing of each frame [s]; None as for `until`."""
         with self._reading("its wall times") as file:
             if "parameters/wall_time" not in file:
                 return None
@@ -464,7 +464,7 @@ class Trajectory(Stored):
 
     @property
     def makers(self) -> dict[str, str]:
-        """What made the file, and when: "name", "version", "python", "numpy", "numba", "hdf5", "machine", "date"."""
+        """The software that made the file, and the date: name, version, python, numpy, numba, hdf5, machine, date."""
         with self._reading("what made it"):
             self._checked.require_attributes("h5md/creator")
             return dict(self._makers)
@@ -474,7 +474,7 @@ class Trajectory(Stored):
     def table(self) -> "pandas.DataFrame":
         """The observables as a pandas frame: `time` first, a row for each frame.
 
-        Vectors have a column for each component, momentum_x, and what each surface has one for each surface, impulse_0
+        Vectors have a column for each component, momentum_x, and arrays over surfaces one for each surface, impulse_0
         and wall_position_0_x.
 
         Raises:
@@ -486,7 +486,7 @@ class Trajectory(Stored):
         """Draw energies, errors, penetration, impacts, pressure, speeds and the particles or bodies at the end.
 
         Args:
-            particles: the most particles that are drawn, evenly chosen, or points of bodies.
+            particles: the largest number of particles, or points of bodies, that are drawn, evenly chosen.
             figsize: width and height [inches], at 100 pixels an inch; None: as large as the plots need.
 
         Returns:
@@ -512,15 +512,15 @@ class Trajectory(Stored):
     ) -> Path:
         """Write a film of the particles or bodies among their walls, coloured by speed.
 
-        200 frames of 10 000 particles take 15 s of one core. Walls are drawn as they bound the volume at the start, and
-        moved where they move. The path that it returns shows nothing in a notebook: `film` does.
+        200 frames of 10 000 particles take 15 s of one core. Walls are drawn as they bound the volume at the start;
+        moving walls move. The returned path shows nothing in a notebook: `film` does.
 
         Args:
-            path: `.mp4`, by ffmpeg, or `.gif`, which is some ten times as large.
-            frames: the most that are drawn, evenly chosen, with the first and the last.
-            fps: frames a second, above 0; of a GIF at most 50.
+            path: `.mp4`, by ffmpeg, or `.gif`, about ten times as large.
+            frames: the largest number of frames, evenly chosen, with the first and the last.
+            fps: frames a second, above 0; at most 50 for a GIF.
             size: width and height in pixels, 64 to 8192 each; an odd one is made even.
-            particles: the most that are drawn, evenly chosen, or points of bodies.
+            particles: the largest number of particles, or points of bodies, that are drawn, evenly chosen.
             overwrite: replace an existing file.
 
         Returns:
@@ -538,19 +538,19 @@ class Trajectory(Stored):
     ) -> "Film":
         """A film of the particles or bodies among their walls, which a notebook shows.
 
-        It is drawn as by `animate`, smaller and of fewer frames: all of it is kept in the notebook, some 0.5 MB. It
-        needs no kernel and no network to play when the notebook is opened again; in one that is not trusted it waits
-        for its play button. `film.save("run.mp4")` writes it.
+        It is drawn as by `animate`, smaller and of fewer frames, since all of it is kept in the notebook: about 0.5 MB.
+        It needs no kernel and no network to play when the notebook is opened again; if the notebook is not trusted it
+        waits for its play button. `film.save("run.mp4")` writes it.
 
         Args:
-            frames: the most that are drawn, evenly chosen, with the first and the last.
-            fps: frames a second, above 0; where ffmpeg is missing at most 50.
+            frames: the largest number of frames, evenly chosen, with the first and the last.
+            fps: frames a second, above 0; at most 50 where ffmpeg is missing.
             size: width and height in pixels, 64 to 8192 each; an odd one is made even.
-            particles: the most that are drawn, evenly chosen, or points of bodies.
+            particles: the largest number of particles, or points of bodies, that are drawn, evenly chosen.
 
         Returns:
-            A `Film`: a video, or a GIF where ffmpeg is not installed. One of more than 22 MB is not shown, since it
-            would make the notebook hang, and says so.
+            A `Film`: a video, or a GIF where ffmpeg is not installed. A film of more than 22 MB is not shown, and says
+            so, since it would make the notebook hang.
 
         Raises:
             SceneError: an argument is out of its range, the trajectory is damaged or keeps no particles, or matplotlib
@@ -561,11 +561,11 @@ class Trajectory(Stored):
     def report(self, path: str | Path | None = None, *, overwrite: bool = False) -> "Page":
         """A page of the run: its scene, whether it went well, graphs, numbers, its speed, and how to reproduce it.
 
-        One file in HTML, some 0.5 MB, for any browser: it needs no other file and no network, is light or dark as the
+        One file in HTML, about 0.5 MB, for any browser: it needs no other file and no network, is light or dark as the
         reader's system, and prints well.
 
         Args:
-            path: `.html`, where the page is written; None: it is only returned.
+            path: `.html`, where the page is written; None: the page is only returned.
             overwrite: replace an existing file.
 
         Returns:
@@ -581,11 +581,11 @@ class Trajectory(Stored):
     def to_xarray(self) -> "xarray.Dataset":
         """The trajectory as a Dataset of xarray, with the dimensions time, particle, axis and surface.
 
-        What is kept of particles, `position`, `velocity`, `image`, `impacts_per_particle`, `escape_time` and
-        `absorbed_time`, is read from the file when its values are used, and only the part that is: a file larger than
+        The columns of particles, `position`, `velocity`, `image`, `impacts_per_particle`, `escape_time` and
+        `absorbed_time`, are read from the file when their values are used, and only the used part: a file larger than
         the memory is no problem, `dataset.position.sel(time=slice(2.0, 3.0)).mean("particle")` reads these frames.
-        Nothing that is read is kept; `dataset.load()` keeps all. As long as it is read, the trajectory must not be
-        closed. Observables and masses are read at once. Units are in `attrs`, and so are the tables of the scene and
+        Data that are read are not kept; `dataset.load()` keeps all. Meanwhile the trajectory must stay open.
+        Observables and masses are read at once. Units are in `attrs`, and so are the tables of the scene and
         the method.
 
         Raises:
@@ -597,14 +597,14 @@ class Trajectory(Stored):
         """Show the trajectory in a Rerun viewer: in a notebook below the cell, else in a window on this machine.
 
         The viewer of a notebook needs WebGL in the browser. The browser gets it (67 MB) from Rerun's server, or, where
-        the kernel does not reach that, from the machine of the kernel, which must be that of the browser then. The
-        environment variable RERUN_NOTEBOOK_ASSET, "serve-local" or a URL, says otherwise; "inline" does not work with
-        Rerun 0.41. It lives as long as the kernel: a notebook that is opened again shows nothing there, but a `film`.
+        the kernel does not reach that, from the machine of the kernel, which must then be that of the browser. The
+        environment variable RERUN_NOTEBOOK_ASSET, "serve-local" or a URL, changes this; "inline" does not work with
+        Rerun 0.41. It lives as long as the kernel: a notebook that is opened again shows only a `film`.
 
         Args:
-            particles: the most particles that are shown, evenly chosen, or points of bodies.
-            color: what their colour shows, "speed" or "energy-error".
-            megabytes: the largest size of what the viewer gets, above 0; of too many frames every k-th is shown.
+            particles: the largest number of particles, or points of bodies, that are shown, evenly chosen.
+            color: the quantity of their colour, "speed" or "energy-error".
+            megabytes: the largest size of the viewer's data, above 0; if all frames exceed it, every k-th is shown.
 
         Raises:
             SceneError: an argument is out of its range, the trajectory is damaged or keeps no particles, rerun-sdk
@@ -621,26 +621,26 @@ class Trajectory(Stored):
         overwrite: bool = False,
         progress: "Progress | None" = None,
     ) -> list[Path]:
-        """Write the trajectory to files of another format; units are as they are, and so are digits of .xyz and .csv.
+        """Write the trajectory to files of another format; units stay, and .xyz and .csv keep all digits.
 
         Args:
-            path: its suffix says the format: `.vtkhdf` for ParaView, `.xyz` (extended XYZ) for OVITO and ASE, `.gsd`
-                for HOOMD-blue and freud, in which numbers are float32, `.ply` for Blender, MeshLab, Open3D and games,
-                float32 too, a file a frame: NAME_0000.ply and so on, `.csv` for spreadsheets and pandas, and `.obj`
+            path: its suffix is the format: `.vtkhdf` for ParaView, `.xyz` (extended XYZ) for OVITO and ASE, `.gsd`
+                for HOOMD-blue and freud, with float32 numbers, `.ply` for Blender, MeshLab, Open3D and games, float32
+                too, a file a frame: NAME_0000.ply and so on, `.csv` for spreadsheets and pandas, and `.obj`
                 for the walls at a frame, an object a surface, in Blender, games and CAD.
-            frames: a slice of the frames, such as slice(0, None, 10), or the number of one; None: all, of `.obj` the
+            frames: a slice of the frames, such as slice(0, None, 10), or the number of one; None: all, for `.obj` the
                 first.
-            particles: k is every k-th particle, or body, beginning with the first.
-            surfaces: of `.vtkhdf`, write also the walls, as triangles, to `NAME.surfaces.vtkhdf`. Fields of
+            particles: k for every k-th particle, or body, beginning with the first.
+            surfaces: for `.vtkhdf`, write also the walls, as triangles, to `NAME.surfaces.vtkhdf`. Fields of
                 more than 2000 solids are points of `NAME.solids.vtkhdf`, a few numbers for each.
-            overwrite: replace existing files; of a longer sequence of `.ply` all of them.
-            progress: is called with how many frames are written, and how many there are to write.
+            overwrite: replace existing files; for `.ply` also all files of a longer sequence.
+            progress: a function, called with the number of written frames and the number of all frames to write.
 
         Returns:
-            The files. They have their names when they are whole; one frame at a time is in memory.
+            The files. They get their names when they are complete; one frame at a time is in memory.
 
         Raises:
-            SceneError: another suffix, an argument out of its range or that is not one of the format, a library that
+            SceneError: another suffix, an argument that is out of its range or not of the format, a library that
                 is missing, or a file that exists.
             FileError: the file cannot be written.
         """

@@ -1,4 +1,4 @@
-"""Writing trajectories: frames are appended, the times last. There are as many complete frames as times."""
+"""Trajectories are written: frames are appended, their times last. The number of times is that of complete frames."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -23,10 +23,10 @@ from .storage import Storage
 
 # Frames x particles of a chunk: a particle's path and a frame are both read with few chunks.
 _CHUNK = (10, 1000)
-# The chunk cache of positions holds the chunks of one frame, up to this many bytes; that of an observable its last
-# chunks.
+# The chunk cache of positions holds the chunks of one frame, up to this number of bytes; the cache of an observable
+# holds its last chunk.
 _LARGEST_CACHE = 1 << 28
-# The most bytes of a chunk of an observable: a shard has one that is as long as it has chunks.
+# The largest number of bytes of a chunk of an observable: a shard has one with an entry for each of its chunks.
 _MOST_BYTES = 1 << 20
 _PACKED: dict[str, dict[str, Any]] = {
     "none": {},
@@ -34,7 +34,7 @@ _PACKED: dict[str, dict[str, Any]] = {
     "lzf": {"compression": "lzf", "shuffle": True},
 }
 
-# The datasets that grow, but those of particles and observables.
+# The growing datasets that are neither of particles nor observables.
 _STEP, _TIME, _WALL_TIME = "parameters/frame", "parameters/time", "parameters/wall_time"
 _EDGES = "particles/all/box/edges/value"
 
@@ -55,7 +55,7 @@ def columns_of(scene: Scene, particles: Particles, storage: Storage) -> list[Col
 
 
 def size_of(scene: Scene, particles: Particles, storage: Storage, frames: int) -> int:
-    """Bytes that the particles of a run take in its trajectory, without compression: whole chunks of frames."""
+    """Bytes of the particles of a run in its trajectory, without compression: whole chunks of frames."""
     row = sum(
         int(np.prod(width)) * np.dtype(kind).itemsize for _name, width, kind in columns_of(scene, particles, storage)
     )
@@ -69,11 +69,11 @@ WriteFrames = Callable[[list[Written]], None]
 
 
 class TrajectoryWriter(AppendedFile):
-    """A context that creates the file, or reopens it, and gives the function that writes frames.
+    """A context that creates the file, or reopens it, and returns the function that writes frames.
 
-    Frame k is row k, so a resumed run leaves no gap and no duplicate. Several frames at once cost little more than one:
-    the time goes into the twenty datasets and the flush. The file gets its name when its first frame is whole; until
-    then an existing file of that name, and its checkpoint, stay.
+    Frame k is row k, so a resumed run leaves no gap and no duplicate. Several frames at once take little longer than
+    one: the time goes into the twenty datasets and the flush. The file gets its name when its first frame is complete;
+    until then an existing file of that name, and its checkpoint, stay.
     """
 
     def __init__(
@@ -98,11 +98,11 @@ class TrajectoryWriter(AppendedFile):
         self.course: Course | None = None
         self._wall_time: Any = None
         self._radius = particles.radius
-        # That of points is not written, and would be computed to be asked for.
+        # The volume of points is not written, and its computation would be wasted.
         self._volume = None if particles.radius is None else particles.volume
         self._columns = columns_of(scene, particles, storage)
         self._edges: Any = None
-        # None of a file of an older version.
+        # None for a file of an older version.
         self._sums: checksums.RowSums | None = None
 
     def __enter__(self) -> WriteFrames:
@@ -163,7 +163,7 @@ class TrajectoryWriter(AppendedFile):
             self._make_particles(name, (n, *width), kind)
 
     def _describe(self, parameters: Any) -> None:
-        """Write what only some runs have."""
+        """Write the parameters that only some runs have."""
         if self._text is not None:
             parameters["scene_file"] = self._text
         if self._bodies is not None:
@@ -173,7 +173,7 @@ class TrajectoryWriter(AppendedFile):
             parameters["volume"] = self._volume
 
     def _make_particles(self, name: str, shape: tuple[int, ...], kind: Any) -> None:
-        """The element of the particles of this name."""
+        """Create the element of the particles of this name."""
         packed = _PACKED[self._storage.compression]
         # A compressed chunk is written once: one that grows is moved, and a kill during that would lose it.
         chunk = 1 if packed else _CHUNK[0], min(shape[0], _CHUNK[1]), *shape[1:]
@@ -208,15 +208,15 @@ class TrajectoryWriter(AppendedFile):
         return min(_LARGEST_CACHE, chunks * _CHUNK[0] * _CHUNK[1] * 24)
 
     def _element(self, name: str, shape: tuple[int, ...], kind: Any, chunks: tuple[int, ...], **options: Any) -> Any:
-        """A time-dependent H5MD element."""
+        """Create a time-dependent H5MD element."""
         group = self._file.create_group(name)
         group["step"], group["time"] = self._step, self._time
-        # Of a scene without walls there is nothing about each wall, and a chunk holds something.
+        # A scene without walls has empty data of walls, but a chunk must not be empty.
         most, chunks = tuple(length or None for length in shape), tuple(length or 1 for length in chunks)
         return group.create_dataset("value", (0, *shape), kind, maxshape=(None, *most), chunks=chunks, **options)
 
     def _make_observables(self, seen: dict[str, Any]) -> None:
-        """Make room for the observables, which are known with the first frame, and for checksums of all, and begin."""
+        """Create the datasets of observables, which are known with the first frame, and of checksums, and begin."""
         for name in (name for name in seen if name != "time"):
             entry = np.asarray(seen[name])
             chunk = max(1, min(ROWS, _MOST_BYTES // max(1, entry.nbytes))), *entry.shape
@@ -231,7 +231,7 @@ class TrajectoryWriter(AppendedFile):
             if not self._observables:
                 self._make_observables(seen)
             if self._sums is not None and self._sums.forget(first, len(frames)):
-                # A kill between a row that is written again and its checksum is no damage.
+                # Cleared checksums are flushed first: a kill between an overwritten row and its checksum is harmless.
                 self._file.flush()
             for name, dataset in self._values.items():
                 parts = [getattr(state, name) for state in states]
@@ -255,7 +255,7 @@ class TrajectoryWriter(AppendedFile):
                 self._take_name()
 
     def _growing(self) -> dict[str, tuple[int, int]]:
-        """The datasets that grow: how many entries their rows have, and of how many each there is a checksum."""
+        """The growing datasets: the number of entries in their rows, and in the blocks with a checksum."""
         there = {_EDGES: self._edges, _WALL_TIME: self._wall_time}
         names = [_STEP, _TIME, *(name for name, dataset in there.items() if dataset is not None)]
         names += [f"observables/{name}/value" for name in self._observables]
@@ -263,21 +263,21 @@ class TrajectoryWriter(AppendedFile):
         return dict.fromkeys(names, (1, 0)) | of_each
 
     def _put(self, name: str, dataset: Any, first: int, values: Any) -> None:
-        """Write rows of a dataset, and note their checksums."""
+        """Write rows of a dataset, and add their checksums."""
         entries = put(dataset, first, values)
         if self._sums is not None:
             self._sums.add(name, entries)
 
     def _take_name(self) -> None:
-        """Take the name of the trajectory from an older file, and remove the checkpoint of that one."""
+        """Take the name of the trajectory from an older file, and remove the older checkpoint."""
         self._rename()
         paths.checkpoint_of(self._path).unlink(missing_ok=True)
 
 
 def rows(frames: list[NDArray[Any]], dtype: DTypeLike) -> NDArray[Any]:
-    """Frames in the order of the file, (frames, n, 3), from arrays (3, n).
+    """Return frames in the order of the file, (frames, n, 3), from arrays (3, n).
 
-    One coordinate at a time: NumPy copies a transposed array along its rows of three, which takes 3.5 times as long.
+    It copies one coordinate at a time: NumPy copies a transposed array along its rows of three, in 3.5 times the time.
     """
     out = np.empty((len(frames), frames[0].shape[1], 3), dtype)
     for row, frame in zip(out, frames, strict=True):
@@ -287,7 +287,7 @@ def rows(frames: list[NDArray[Any]], dtype: DTypeLike) -> NDArray[Any]:
 
 
 def _edges_of(scene: Scene) -> list[float]:
-    """The lengths of the cell; where it does not repeat that of the volume, or where this is open of the surfaces."""
+    """The lengths of the cell; in a direction without a period those of the volume or, if open, of the surfaces."""
     low, high = scene.bounds()
     return [
         length or (b - a if np.isfinite(b - a) else 2.0 * scene.extent())
@@ -298,7 +298,7 @@ def _edges_of(scene: Scene) -> list[float]:
 def descriptions(
     scene: Scene, method: Method, storage: Storage, arrays: dict[str, Any] | None = None
 ) -> dict[str, str]:
-    """The texts that identify a run; `arrays` get what they name and do not hold."""
+    """The texts that identify a run; long arrays that the texts name are added to `arrays`."""
     return {
         "scene": tomli_w.dumps(tables.scene_table(scene, {} if arrays is None else arrays)),
         "method": tomli_w.dumps(tables.table_of(method)),

@@ -1,4 +1,4 @@
-"""The connection to a cluster: its client, what is checked of its workers, and the fleet of its workers."""
+"""The connection to a cluster: its client, checks of its workers, and the fleet of its workers."""
 
 import os
 import re
@@ -15,16 +15,16 @@ from ..common.extras import needed_by
 from ..errors import SceneError
 from . import jobs
 
-# Seconds until a scheduler must answer, and until it must have a worker.
+# Timeouts [s] for the answer of a scheduler, and for its first worker.
 SCHEDULER, WORKER = 10.0, 60.0
 _GLANCE = 0.05
-# Until a file appears that another machine wrote, which network file systems show after a while.
+# The time until a file of another machine appears [s], which network file systems show with a delay.
 APPEARS = 10.0
-# Reports of all jobs in a second, so that the scheduler has little to do.
+# The largest number of reports of all jobs in a second, so that the scheduler has little to do.
 _MOST_REPORTS = 100
 # Jobs that are handed out at the same time, for each thread: one waits at the worker while another runs.
 _HANDED_OUT = 2
-# What must be the same everywhere: an object that is pickled here is read there.
+# Packages with the same version everywhere: an object that is pickled here is read there.
 _PACKAGES = ("swarm", "numba", "numpy")
 _LOCAL = re.compile(r"local:([1-9]\d{0,3})")
 _ADDRESS = re.compile(r"[a-z][a-z+]*://.+")
@@ -44,11 +44,11 @@ def require_known(cluster: Any) -> None:
 
 @contextmanager
 def connected(cluster: Any, stop: jobs.Stop) -> Iterator[Any]:
-    """A client of the cluster, which has a worker; what is started here ends with the context.
+    """Connect to a cluster that has a worker; return its client. Processes that are started here end with the context.
 
     Raises:
-        KeyboardInterrupt: there is a reason to stop before it has one.
-        SceneError: `distributed` is not installed, the scheduler does not answer, it has no worker.
+        KeyboardInterrupt: `stop` has a reason before there is a worker.
+        SceneError: `distributed` is not installed, the scheduler does not answer, or it has no worker.
     """
     require_known(cluster)
     with needed_by("a cluster", "cluster"):
@@ -65,7 +65,7 @@ def connected(cluster: Any, stop: jobs.Stop) -> Iterator[Any]:
                 address = stack.enter_context(started(workers))
             try:
                 client = stack.enter_context(Client(address, timeout=SCHEDULER, set_as_default=False))
-            except (OSError, ValueError) as error:  # among the first: TimeoutError
+            except (OSError, ValueError) as error:  # TimeoutError is an OSError
                 raise SceneError(
                     f"the scheduler {address} must answer within {SCHEDULER:g} s, got no answer; check that it runs, "
                     "and that this machine can reach it"
@@ -130,7 +130,7 @@ def require_shared(client: Any, folder: Path) -> None:
 
 
 def require_read(client: Any, files: Iterable[Path]) -> None:
-    """Raise a SceneError that names a file which a worker does not find, and the worker."""
+    """Raise a SceneError that names a file that a worker does not find, and the worker."""
     for address, missing in sorted(client.run(_missing, [str(file) for file in files]).items()):
         if missing:
             raise SceneError(
@@ -140,18 +140,18 @@ def require_read(client: Any, files: Iterable[Path]) -> None:
 
 
 class Workers(jobs.Fleet):
-    """The workers of a cluster. Those that die are replaced by Dask, which hands their jobs out again.
+    """The workers of a cluster. Dask replaces those that die, and hands their jobs out again.
 
     Args:
-        client: of the cluster.
-        stop: as of `Fleet`.
-        count: of jobs that are all handed out at once; None: as many as the workers have room for.
+        client: the client of the cluster.
+        stop: as for `Fleet`.
+        count: the number of jobs that are all handed out at once; None: as many as the workers have room for.
     """
 
     def __init__(self, client: Any, stop: jobs.Stop, count: int | None = None) -> None:
         super().__init__(stop)
         self._client, self._count = client, count
-        # A job is not pure: Dask must not take one for another that has the same arguments.
+        # A job is not pure: Dask must not reuse the outcome of another job with the same arguments.
         self._executor = client.get_executor(pure=False)
         self._reports: list[tuple[int, dict[str, Any]]] = []
         client.subscribe_topic(self.token, self._note)
@@ -161,7 +161,7 @@ class Workers(jobs.Fleet):
         self._reports.append(event[1])
 
     def room(self) -> float:
-        """All jobs, or some for each thread of the workers that there are now."""
+        """The number of jobs that may be handed out: `count`, or a few for each thread of the present workers."""
         return self._count or _HANDED_OUT * threads_of(self._client)
 
     def submit(self, job: jobs.FleetJob) -> "Future[jobs.JobEnd]":
@@ -171,16 +171,16 @@ class Workers(jobs.Fleet):
         return made
 
     def hear(self) -> None:
-        """Take the reports that have come."""
+        """Take the new reports."""
         while self._reports:
             self.take(*self._reports.pop(0))
 
     def ask_to_stop(self) -> None:
-        """Ask all workers to stop their jobs; some may have died."""
+        """Ask all workers to stop their jobs; workers that have died are left out."""
         self._client.run(jobs.stop, self.token, on_error="ignore")
 
     def sentence_of(self, job: jobs.FleetJob, error: Exception) -> str:
-        """Why Dask returned no outcome."""
+        """Return the reason why Dask returned no outcome."""
         if isinstance(error, CancelledError):
             return "the scheduler has lost it; it can be resumed"
         if type(error).__name__ == "KilledWorker":
@@ -198,7 +198,7 @@ class Workers(jobs.Fleet):
 
 
 def threads_of(client: Any) -> int:
-    """The threads of all workers."""
+    """The number of threads of all workers."""
     return sum(one["nthreads"] for one in client.scheduler_info(n_workers=-1)["workers"].values())
 
 
@@ -224,7 +224,7 @@ def _work(
 
 
 def _answer(folder: str, token: str) -> str:
-    """Read what the client wrote into the folder, and write the same there under the name that is returned."""
+    """Read the client's file in the folder, and write a copy there; return its name, or "" if the file is missing."""
     asked, name = Path(folder) / _storage_file(token), ""
     if _appears(asked):
         name = _storage_file(f"{token}.{socket.gethostname()}.{os.getpid()}")
@@ -234,7 +234,7 @@ def _answer(folder: str, token: str) -> str:
 
 
 def _missing(files: list[str]) -> str:
-    """The first of these files that is not there, or ""."""
+    """The first of these files that does not exist, or ""."""
     return next((file for file in files if not _appears(Path(file))), "")
 
 
@@ -244,7 +244,7 @@ def _storage_file(token: str) -> str:
 
 
 def _appears(path: Path) -> bool:
-    """Whether a file is there, now or a little later."""
+    """Whether a file exists, now or within `APPEARS` seconds."""
     latest = time.monotonic() + APPEARS
     while not path.exists() and time.monotonic() < latest:
         time.sleep(_GLANCE)

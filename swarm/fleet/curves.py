@@ -11,9 +11,9 @@ from ..pictures import style
 from ..words.amounts import plain
 from .folder import SweepFolder
 
-# Graphs of each parameter, and curves of another parameter in one.
+# The largest number of graphs of a parameter, and of curves of another parameter in one.
 _MOST, _CURVES = 6, 6
-# Numbers that differ by less, as a part of the largest, are one; errors below are those of round-off.
+# Numbers that differ by a smaller part of the largest are equal; errors below the second value are round-off.
 _SAME, _ROUND_OFF = 1e-9, 1e-12
 _REPEATS = "seed"
 
@@ -28,7 +28,7 @@ def drawn(sweep: SweepFolder) -> list[tuple[str, list[PagePicture]]]:
 
 
 def main_observables(sweep: SweepFolder) -> list[str]:
-    """The observables that differ between runs and say the most; user-defined ones come first."""
+    """The most informative observables that differ between runs; user-defined ones come first."""
     columns = {name: _numbers([row.get(name) for row in sweep.rows]) for name in sweep.observables}
     columns = {name: values[np.isfinite(values)] for name, values in columns.items()}
     found = [name for name, values in columns.items() if len(values) and _differ(values)]
@@ -37,7 +37,7 @@ def main_observables(sweep: SweepFolder) -> list[str]:
     main = sorted((name for name in found if _stem(name) in MAIN), key=lambda name: MAIN.index(_stem(name)))
     chosen: list[str] = []
     for name in [*own, *main]:
-        # Without gravity the total energy is the kinetic one.
+        # Without gravity the total energy is the kinetic energy.
         if not any(_alike(columns[name], columns[other]) for other in chosen):
             chosen.append(name)
     return chosen[:_MOST]
@@ -52,7 +52,7 @@ def _alike(one: Any, other: Any) -> bool:
 
 
 def worst(sweep: SweepFolder) -> list[tuple[str, str]]:
-    """The largest error of the energy and the largest penetration of all runs, as far as these have them."""
+    """The largest error of the energy and the largest penetration of all runs that have them."""
     texts = []
     for name, what, unit in zip(ERRORS, ("largest error of the energy", "largest penetration"), ("", "m"), strict=True):
         values = {str(row["file"]): row[name] for row in sweep.rows if isinstance(row.get(name), (int, float))}
@@ -64,7 +64,7 @@ def worst(sweep: SweepFolder) -> list[tuple[str, str]]:
 
 
 def _stem(name: str) -> str:
-    """The observable of a column such as impulse_0 or crossings_0_1."""
+    """The observable of a column, such as impulse for impulse_0, or crossings for crossings_0_1."""
     return next((known for known in MAIN if re.fullmatch(rf"{known}(_\d+)*", name)), "")
 
 
@@ -95,7 +95,7 @@ def _graph(sweep: SweepFolder, rows: list[dict[str, Any]], key: str, name: str) 
 
 
 def _curve(axes: Any, places: Any, values: Any, colour: str, label: str) -> None:
-    """The mean at each place with the standard deviation of a run, and the runs."""
+    """Draw the mean at each place with the standard deviation of a run, and the runs."""
     known = np.isfinite(values)
     places, values = places[known], values[known]
     where = np.unique(places)
@@ -106,7 +106,7 @@ def _curve(axes: Any, places: Any, values: Any, colour: str, label: str) -> None
 
 
 def _places(values: list[Any]) -> tuple[Any, list[str]]:
-    """Where values are on an axis, and their labels where they are no numbers."""
+    """The positions of values on an axis, and their labels if they are not numbers."""
     if all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values):
         return np.array(values, np.float64), []
     texts = [str(value) for value in values]

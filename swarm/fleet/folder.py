@@ -1,4 +1,4 @@
-"""The folder of a sweep as it is found: the table of its runs, its sweep file, and whether it is complete."""
+"""The folder of a sweep: the table of its runs, its sweep file, and whether it is complete."""
 
 import csv
 import json
@@ -17,13 +17,13 @@ _ABOUT = ("state", "error", "wall_time")
 
 @dataclass(frozen=True)
 class SweepFolder:
-    """The runs of a folder.
+    """The runs in the folder of a sweep.
 
     Attributes:
-        path: of the folder.
-        rows: of each run by the names of the table's columns; texts, numbers or None.
+        path: the folder.
+        rows: for each run, its values by column of the table: texts, numbers or None.
         parameters: the keys of the sweep.
-        observables: the names of the others.
+        observables: the names of the other columns.
         text: the sweep file, or None.
         table: the file of the table, or None.
     """
@@ -41,10 +41,10 @@ class SweepFolder:
 
 
 def found(path: Path) -> SweepFolder:
-    """The sweep of a folder: its table, as far as runs have not ended since it was written.
+    """Read the sweep of a folder: its table, with the runs that have ended since it was written.
 
     Raises:
-        SceneError: it is no folder of a sweep, or the table is damaged.
+        SceneError: it is not the folder of a sweep, or the table is damaged.
     """
     files = [path / f"results.{kind}" for kind in TABLES if (path / f"results.{kind}").is_file()]
     table = max(files, key=lambda file: file.stat().st_mtime, default=None)
@@ -99,13 +99,13 @@ def _read(table: Path) -> tuple[list[str], list[dict[str, Any]]]:
 
 
 def _plain(value: Any) -> Any:
-    """A cell of pandas, without its types."""
+    """A cell of pandas as a plain value of Python."""
     value = value.item() if hasattr(value, "item") else value
     return None if value is None or value != value else value
 
 
 def _value(cell: Any) -> Any:
-    """A cell of text as a number where it is one; None where it is empty."""
+    """A cell of text as a number if it is one; None if it is empty."""
     if cell in (None, ""):
         return None
     for kind in (int, float):

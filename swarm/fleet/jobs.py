@@ -1,8 +1,8 @@
-"""Jobs that other processes carry out, and what both sides do for them.
+"""Jobs that other processes carry out, on the side of the worker and on the side of the caller.
 
-A fleet hands jobs out through a `concurrent.futures.Executor`: of loky for processes of this machine (`processes`), of
-Dask on a cluster (`connection`). An executor carries a call and its outcome. A fleet adds what a run needs while it is
-under way: its reports, and the request to stop with a checkpoint.
+A fleet hands out jobs through a `concurrent.futures.Executor`: of loky for processes of this machine (`processes`), of
+Dask on a cluster (`connection`). An executor carries a call and its outcome. A fleet adds the messages during a
+run: its reports, and the request to stop with a checkpoint.
 """
 
 import contextlib
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from ..run.progress import Display
     from ..run.session import Session
 
-# Seconds between looks at the jobs, and between requests to stop, which are repeated for jobs that begin meanwhile.
+# Seconds between looks at the jobs, and between requests to stop, repeated for jobs that begin meanwhile.
 _GLANCE, _AGAIN = 0.1, 1.0
-# Seconds between the reports of a job, and those in which another process that wrote the same file has to end.
+# Seconds between the reports of a job, and the time for another process that wrote the same file to end.
 REPORTS, PATIENCE = 1.0, 30.0
 # "state": "done", "stopped" or "failed"; "error" of a failure; "lost" if the worker returned no outcome.
 JobEnd = dict[str, Any]
@@ -32,14 +32,14 @@ Tell = Callable[[dict[str, Any]], None]
 
 
 class Reporter(NamedTuple):
-    """The connection of a job to its fleet: the token of the fleet, what takes messages, and seconds between them."""
+    """The connection of a job to its fleet: the fleet's token, the function for messages, and seconds between them."""
 
     token: str
     tell: Tell
     every: float
 
     def display(self) -> "Display":
-        """The display of a run that reports the share that is done, and what it compiles."""
+        """Return the display of a run that reports its progress and its compilation."""
         from ..run.progress import Display
 
         last = -math.inf
@@ -60,7 +60,7 @@ class Reporter(NamedTuple):
 
 
 class FleetJob(NamedTuple):
-    """A function that a worker calls with a `Reporter` and the arguments; it returns what its outcome has besides."""
+    """A function that a worker calls with a `Reporter` and the arguments; it returns further entries of its outcome."""
 
     number: int
     work: Callable[..., JobEnd]
@@ -81,7 +81,7 @@ def carried_out(
     tell: Tell = lambda message: None,
     every: float = REPORTS,
 ) -> JobEnd:
-    """The outcome of a job, which raises only what is unexpected."""
+    """Carry out a job and return its outcome; only unexpected errors are raised."""
     began = time.monotonic()
     if token in _stopped:
         return {"state": "stopped"}
@@ -95,7 +95,7 @@ def carried_out(
 
 @contextlib.contextmanager
 def session_of(options: "RunOptions", token: str) -> "Iterator[Session]":
-    """A session that a request to stop its fleet ends."""
+    """Return a session that ends at a request to stop its fleet."""
     from ..run.session import Session
 
     session = Session(options)
@@ -109,13 +109,13 @@ def session_of(options: "RunOptions", token: str) -> "Iterator[Session]":
 
 
 def stop(token: str) -> None:
-    """Let the runs of a fleet in this process save their checkpoints and end, and begin no more of them."""
+    """Make the runs of a fleet in this process save their checkpoints and end, and let no more of them begin."""
     _stopped.add(token)
     stop_present(token)
 
 
 def stop_present(token: str) -> None:
-    """Let the runs of a fleet that are under way in this process save their checkpoints and end."""
+    """Make the present runs of a fleet in this process save their checkpoints and end."""
     for session in _sessions.get(token, set()).copy():
         session.stop()
 
@@ -124,26 +124,26 @@ def stop_present(token: str) -> None:
 
 
 class Stop:
-    """Whether to begin no more jobs, and to let those under way end with a checkpoint; and the first reason, or ""."""
+    """A request to begin no more jobs and to end the present ones with a checkpoint; `reason` is the first, or ""."""
 
     reason = ""
 
     def because(self, reason: str) -> None:
-        """Stop."""
+        """Request to stop, for a reason."""
         self.reason = self.reason or reason
 
     def interrupt(self) -> None:
-        """Stop for a signal."""
+        """Request to stop because of a signal."""
         self.because("interrupted")
 
 
 class Fleet(ABC):
-    """Workers that carry out jobs, until `stop` has a reason not to; they end with the context."""
+    """Workers that carry out jobs until `stop` has a reason; they end with the context."""
 
     def __init__(self, stop: Stop) -> None:
         self.token = secrets.token_hex(8)
         self._stop = stop
-        # The share that is done of each job under way.
+        # The progress of each job under way, from 0 to 1.
         self.shares: dict[int, float] = {}
         self._sentences: list[str] = []
 
@@ -156,7 +156,7 @@ class Fleet(ABC):
         self.close()
 
     def run(self, jobs: Iterable[FleetJob], ended: Callable[[int, JobEnd], None], glance: Callable[[], None]) -> None:
-        """Carry out jobs; `ended` gets the outcome of each, and `glance` is called some times a second."""
+        """Carry out jobs; `ended` gets the outcome of each, and `glance` is called a few times a second."""
         left, under_way, asked = iter(jobs), dict[Future[JobEnd], FleetJob](), -math.inf
         while True:
             room = self.room()
@@ -193,13 +193,13 @@ class Fleet(ABC):
             self._sentences.append(message["compiling"])
 
     def new_sentences(self) -> list[str]:
-        """What jobs have said that they compile since the last call."""
+        """Return the jobs' sentences about their compilation since the last call."""
         new, self._sentences = self._sentences, []
         return new
 
     @abstractmethod
     def room(self) -> float:
-        """How many jobs may be under way."""
+        """Return the largest number of jobs under way."""
 
     @abstractmethod
     def submit(self, job: FleetJob) -> "Future[JobEnd]":
@@ -207,7 +207,7 @@ class Fleet(ABC):
 
     @abstractmethod
     def hear(self) -> None:
-        """Take the reports that have come."""
+        """Take the new reports."""
 
     @abstractmethod
     def ask_to_stop(self) -> None:
@@ -215,7 +215,7 @@ class Fleet(ABC):
 
     @abstractmethod
     def sentence_of(self, job: FleetJob, error: Exception) -> str:
-        """Why the worker of a job returned no outcome."""
+        """Return the reason why the worker of a job returned no outcome."""
 
     @abstractmethod
     def close(self) -> None:

@@ -1,6 +1,6 @@
 """The trajectory of all shards: their particles by HDF5's virtual datasets, their observables added up.
 
-It is read as that of one run. The shards are named relative to it: it can be moved together with their folder.
+It is read like the trajectory of one run. It names the shards relative to itself: they can be moved together.
 """
 
 import functools
@@ -36,7 +36,7 @@ _AT_ONCE = 256
 def seen_of(
     folder: Path, task: Task, bounds: list[int], first: int = 0
 ) -> Iterator[tuple[int, dict[str, Any], Snapshot]]:
-    """The frames that every shard holds, from number `first` on: how many there are, the observables and particles."""
+    """The frames that every shard holds, from number `first` on: their count so far, observables and particles."""
     files = [shards.file_of(folder, k) for k in range(len(bounds) - 1)]
     if not all(file.exists() for file in files):
         return
@@ -62,13 +62,13 @@ def seen_of(
 
 
 def _gathered(of_shards: list[Trajectory], task: Task, k: int, name: str) -> Any:
-    """An array of the particles of frame k, of all shards."""
+    """An array of the particles of frame k, gathered from all shards."""
     if name == "mass":
         return task.particles.mass
     parts = [values_of(one, k, name) for one in of_shards]
     if any(part is None for part in parts):
         return None
-    # Of bodies point p of copy i is particle p n + i.
+    # For bodies, point p of copy i is particle p n + i.
     points = 1 if task.bodies is None else len(task.bodies.body)
     apart = [part.reshape(*part.shape[:-1], points, -1) for part in parts]
     joined = np.concatenate(apart, axis=-1)
@@ -85,7 +85,7 @@ def _joined(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _added(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
-    """The same, of particles that are independent."""
+    """The sums of the observables of shards with independent particles."""
     sums, owners = np.hstack([part[CHUNK_SUMS] for part in parts]), task.compiled.numbering.surfaces_of_rows
     brought = {}
     if task.particles.births is not None:
@@ -118,10 +118,10 @@ def _added(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 class JoinedWriter(TrajectoryWriter):
-    """A writer with the particles of the shards; it writes only what is not of particles.
+    """A writer whose particles are in the shards; it writes all other data.
 
-    Its file takes its name when it is whole: to a session after a kill in between, a part of the frames would be a run
-    that cannot go on. The checkpoint, which holds the shards, is left to the session.
+    Its file gets its name when it is complete: after a kill, a later session would take a part of the frames for a run
+    that cannot be resumed. The checkpoint, which holds the shards, is left to the session.
     """
 
     def __init__(self, folder: Path, task: Task, bounds: list[int], frames: int, identity: dict[str, Any]) -> None:
@@ -138,7 +138,7 @@ class JoinedWriter(TrajectoryWriter):
         super().__exit__(kind, error, trace)
 
     def _take_name(self) -> None:
-        """Not yet."""
+        """Do nothing: the file gets its name when it is complete."""
 
     def _make_particles(self, name: str, shape: tuple[int, ...], kind: Any) -> None:
         import h5py
@@ -150,7 +150,7 @@ class JoinedWriter(TrajectoryWriter):
         kept = np.arange(self._count)[self._kept]
         for k, (first, last) in enumerate(itertools.pairwise(self._bounds)):
             points = self._count // copies
-            # Of bodies point p of copy i is particle p n + i.
+            # For bodies, point p of copy i is particle p n + i.
             for p in range(points):
                 begin, end = np.searchsorted(kept, [p * copies + first, p * copies + last])
                 if begin == end:
@@ -179,9 +179,9 @@ def _measured(
 def join(
     folder: Path, task: Task, bounds: list[int], identity: dict[str, Any], measures: Measures = NONE
 ) -> dict[str, NDArray[Any]]:
-    """Write the frames that every shard holds in place of an earlier file, and return their observables.
+    """Replace an earlier file by the frames that every shard holds, and return their observables.
 
-    These include the user-defined observables. Without such frames nothing is written.
+    The user-defined observables are among them. Without such frames no file is written.
 
     Raises:
         RunError: a user-defined observable fails.

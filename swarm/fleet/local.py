@@ -16,7 +16,7 @@ from pathlib import Path
 from ..errors import RunError
 
 _ROOT = Path(__file__).parents[2]
-# Seconds until its processes have ended by themselves.
+# Seconds for its processes to end by themselves.
 _ENDS = 10.0
 # A scheduler runs any code that is sent to it, so it listens on this machine only, whatever Dask's default is.
 _HERE = "127.0.0.1"
@@ -24,7 +24,7 @@ _HERE = "127.0.0.1"
 
 @contextmanager
 def started(workers: int) -> Iterator[str]:
-    """The address of a cluster of so many workers on this machine, which ends with the context.
+    """Start a cluster of this number of workers on this machine, which ends with the context; return its address.
 
     Raises:
         RunError: it does not start.

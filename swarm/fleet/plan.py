@@ -20,15 +20,15 @@ from ..scene import Scene
 from ..serialization.plugins import allowed, checked_modules
 from ..serialization.tables import files_in
 
-# More runs than this are a mistake in a list: their files alone would be a burden to a folder.
+# A sweep with more runs has a mistake in a list: their files alone would be a burden to a folder.
 _MOST = 1_000_000
-# Runs are found again by a digest of what they compute; these keys of [run] change how, not what.
+# Runs are found again by a digest of their inputs; these keys of [run] do not change the results.
 _WITHOUT_EFFECT = ("threads", "checkpoint", "compile")
-# Hexadecimal digits of that digest: among a million runs two have the same once in 500 sweeps, which is found.
+# Hexadecimal digits of that digest: among a million runs two have the same in one of 500 sweeps, which is detected.
 _DIGITS = 12
 STEM = re.compile(rf"[0-9a-f]{{{_DIGITS}}}")
 COMBINE, WAYS = "combine", ("product", "zip")
-# Keys of a document that make its scene.
+# Keys of a document that define its scene.
 _SCENE = ("surface", "gravity", "period", "plane", "pairs")
 
 Document = dict[str, Any]
@@ -39,10 +39,10 @@ class Variant:
     """One run of a sweep.
 
     Attributes:
-        number: its place in the plan, from 0 on.
+        number: its index in the plan.
         parameters: the keys of the sweep and their values.
-        stem: of the names of its files.
-        kind: the same for runs that differ in numbers alone, and probably share their kernels.
+        stem: the stem of the names of its files.
+        kind: the same for runs that differ in numbers alone, and so probably share their kernels.
         has_impacts: whether it writes a log of impacts.
     """
 
@@ -55,7 +55,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class Plan:
-    """The file of a sweep, its tables but [sweep], its runs, modules with code that it may name, and files it names."""
+    """The file of a sweep, its tables without [sweep], its runs, modules of its plugins, and the files it names."""
 
     path: Path
     document: Document
@@ -64,19 +64,19 @@ class Plan:
     named: tuple[Path, ...] = ()
 
     def text(self, variant: Variant) -> str:
-        """The scene file of a run."""
+        """Return the scene file of a run."""
         return f"# A run of {self.path.name}: {in_one_line(variant.parameters)}\n\n" + tomli_w.dumps(
             _with(self.document, variant.parameters)
         )
 
 
 def in_one_line(parameters: Mapping[str, Any]) -> str:
-    """Parameters as a sweep file has them, in one line."""
+    """Parameters as in a sweep file, in one line."""
     return ", ".join(f'"{key}" = {json.dumps(value, default=str):.200}' for key, value in parameters.items())
 
 
 def read(path: Path, plugins: Iterable[str] = ()) -> Plan:
-    """The plan of a sweep file.
+    """Read the plan of a sweep file.
 
     Raises:
         SceneError: the file cannot be read, its [sweep] table is invalid, or the scene of one of its runs is invalid;
@@ -98,7 +98,7 @@ def read(path: Path, plugins: Iterable[str] = ()) -> Plan:
 
 
 def _lists(table: Any) -> tuple[dict[str, list[Any]], str]:
-    """The values of every key, and how they are combined."""
+    """The values of every key, and the way in which they are combined."""
     if not isinstance(table, dict):
         raise SceneError(f"sweep: expected a [sweep] table, got {table!r:.200}")
     way = one_of(f"sweep.{COMBINE}", table.get(COMBINE, WAYS[0]), WAYS)
@@ -112,7 +112,7 @@ def _lists(table: Any) -> tuple[dict[str, list[Any]], str]:
 
 
 def _flat(table: Document, before: str = "") -> Iterator[tuple[str, Any]]:
-    """The keys of a table and of those within it, as TOML makes them of keys with dots that have no quotes."""
+    """The keys of a table and of the tables in it, as TOML makes them of keys with dots but no quotes."""
     for key, value in table.items():
         if isinstance(value, dict) and not (len(value) == 1 and set(value) <= set(MAKERS)):
             if not value:
@@ -171,7 +171,7 @@ MAKERS: dict[str, Callable[[str, Any], list[Any]]] = {
 
 
 def _combined(lists: dict[str, list[Any]], way: str) -> Iterator[dict[str, Any]]:
-    """The parameters of every run: of a product the last key changes first."""
+    """The parameters of every run; in a product the last key changes first."""
     lengths = {key: len(values) for key, values in lists.items()}
     if way == "zip":
         first, n = next(iter(lengths.items()))
@@ -191,17 +191,17 @@ def _combined(lists: dict[str, list[Any]], way: str) -> Iterator[dict[str, Any]]
 
 
 def _checked(path: Path, document: Document, rows: list[dict[str, Any]]) -> tuple[list[Variant], tuple[Path, ...]]:
-    """The runs, each with the scene that it has been found to describe, and the files that they name."""
+    """The checked runs, and the files that they name."""
     contents: dict[Path, str] = {}
-    # A formula or a mesh takes long, and the scenes of many meshes much memory: each is made once, and the last of them
-    # stands for those that are known to be right.
+    # A formula or a mesh takes long, and the scenes of many meshes much memory: each is made once, and only the last
+    # one is kept; `right` has the digests of the valid scenes.
     right: set[str] = set()
     last: Scene | None = None
     variants: dict[str, Variant] = {}
     for parameters in rows:
         own = _with(document, parameters)
         try:
-            # The files that particles are read from are not opened yet.
+            # The files with particles are not opened yet.
             scene = _digest_of([own.get(name) for name in _SCENE])
             job = scene_file.job_of(own, "", path, last if scene in right else None)
             right.add(scene)
@@ -231,14 +231,14 @@ def _checked(path: Path, document: Document, rows: list[dict[str, Any]]) -> tupl
 
 
 def _with(document: Document, parameters: Mapping[str, Any]) -> Document:
-    """The tables of a scene with parameters put in."""
+    """A copy of the tables of a scene with these parameters."""
     for key, value in parameters.items():
         document = _put(document, key.split("."), value, key)
     return document
 
 
 def _put(place: Any, steps: list[str], value: Any, key: str) -> Any:
-    """A copy of a table or list with another value, the rest shared."""
+    """A copy of a table or list with one other value; the rest is shared."""
     step, *rest = steps
     if isinstance(place, dict):
         return {**place, step: _put(place.get(step, {}), rest, value, key) if rest else value}
@@ -254,12 +254,12 @@ def _put(place: Any, steps: list[str], value: Any, key: str) -> Any:
 
 
 def _attributed(sentence: str, parameters: Mapping[str, Any], k: int, n: int) -> str:
-    """The message of an invalid scene, with the key of the sweep that caused the error."""
+    """The message about an invalid scene, with the key of the sweep that caused the error."""
     match = re.match(r"[\w.\[\]-]+", sentence)
     named = match.group().rstrip(".") if match else ""
     owners = {}
     for key, value in parameters.items():
-        # surface.0.radius is surface[0].radius in the sentences of scenes.
+        # Messages about scenes call surface.0.radius surface[0].radius.
         mine = re.sub(r"\.(\d+)", r"[\1]", key)
         if mine == named or mine.startswith((f"{named}.", f"{named}[")) or named.startswith((f"{mine}.", f"{mine}[")):
             owners[key] = value
@@ -286,10 +286,10 @@ def _digest_of(tables: Any) -> str:
 
 
 def _unnumbered(value: Any) -> Any:
-    """A table, or what is in it, without numbers."""
+    """A copy of a table, or of a value in it, without numbers."""
     if isinstance(value, dict):
         return {key: _unnumbered(one) for key, one in value.items()}
     if isinstance(value, list):
-        # Long ones are arrays of numbers.
+        # Long lists are arrays of numbers.
         return [_unnumbered(one) for one in value] if len(value) <= 3 or isinstance(value[0], dict) else []
     return value if isinstance(value, (str, bool)) else None

@@ -1,8 +1,8 @@
 """A fleet of processes of this machine, by loky.
 
-Each process is an executor of its own: loky ends all processes of an executor in which one dies. Unlike those of
-`multiprocessing` they do not import the caller's script once more: one without `if __name__ == "__main__"` and a
-notebook would not do.
+Each process is an executor of its own: loky ends all processes of an executor in which one dies. Unlike the processes
+of `multiprocessing` they do not import the caller's script again, which would fail for a notebook or a script without
+`if __name__ == "__main__"`.
 """
 
 import contextlib
@@ -24,22 +24,22 @@ from . import jobs
 
 # The exit code of a worker without a parent.
 _ORPHANED = 3
-# Of what a process printed before it died, a sentence has so many bytes.
+# The number of last bytes of a dead process's output that its sentence has.
 _LAST = 2000
-# With it no module of the current folder takes the place of one of Python's own.
+# With this variable no module of the current folder takes the place of one of Python's own.
 _SAFE = {"PYTHONSAFEPATH": "1"}
 _READY = {"ready": True}
-# What loky says of a worker that died.
+# The end of loky's message about a worker that died.
 _EXIT = re.compile(r"exit codes of the workers are \{(\w+)\((-?\d+)\)\}")
 
 
 class Processes(jobs.Fleet):
-    """At most so many processes, each of which starts when a job needs it.
+    """At most `number` processes, each of which starts when a job needs it.
 
     Args:
-        stop: as of `Fleet`.
-        number: of processes.
-        first: of them, which may have started; None: one more that starts when a job needs it.
+        stop: as for `Fleet`.
+        number: the largest number of processes.
+        first: a process among them that may have started; None: it starts when a job needs it.
     """
 
     def __init__(self, stop: jobs.Stop, number: int, first: "Place | None" = None) -> None:
@@ -47,17 +47,17 @@ class Processes(jobs.Fleet):
         self._places = [first or Place(), *(Place() for _ in range(number - 1))]
 
     def room(self) -> float:
-        """One job a process."""
+        """The number of processes: each has one job."""
         return len(self._places)
 
     def submit(self, job: jobs.FleetJob) -> "Future[jobs.JobEnd]":
-        """Hand out a job, to a process that has started if one is free."""
+        """Hand out a job, to a free process that has started if there is one."""
         free = [place for place in self._places if place.job not in self.shares]
         place = next((one for one in free if one.executor is not None), free[0])
         return place.submit(job, self.token)
 
     def hear(self) -> None:
-        """Take the reports that have come."""
+        """Take the new reports."""
         for place in self._places:
             for message in place.messages():
                 self.take(place.job, message)
@@ -68,10 +68,10 @@ class Processes(jobs.Fleet):
             place.tell(self.token)
 
     def sentence_of(self, job: jobs.FleetJob, error: Exception) -> str:
-        """Why a process returned no outcome.
+        """Return the reason why a process returned no outcome.
 
         Raises:
-            RunError: it did not start.
+            RunError: the process did not start.
         """
         place = next(place for place in self._places if place.job == job.number)
         if not isinstance(error, BrokenExecutor):
@@ -90,20 +90,20 @@ class Processes(jobs.Fleet):
 
 
 class Place:
-    """A process, or room for one; what it prints goes to a file."""
+    """A process, or the place for one; its output goes to a file."""
 
     def __init__(self) -> None:
         self.executor: Any = None
         self.job, self.ready = -1, False
 
     def start(self) -> None:
-        """Start the process, which imports what jobs need meanwhile, as the caller does."""
+        """Start the process, which imports the modules for its jobs while the caller does."""
         self._make()
         with _without_interrupts():
             self.executor.submit(os.getpid)
 
     def submit(self, job: jobs.FleetJob, token: str) -> "Future[jobs.JobEnd]":
-        """Hand out a job, also to a process that has died, which the future says."""
+        """Hand out a job; if the process has died, the future raises that."""
         self.job = job.number
         if self.executor is None:
             self._make()
@@ -118,13 +118,13 @@ class Place:
         return made
 
     def _make(self) -> None:
-        """Make the executor; its process begins with its first job."""
+        """Create the executor; its process begins with its first job."""
         from multiprocessing import resource_tracker
 
         import loky
         from loky.backend import resource_tracker as tracker_of_loky
 
-        # Processes of their own, which loky would begin with the first worker, and unblock interrupts.
+        # loky would start its helper processes with the first worker, and unblock interrupts.
         with _safe_path():
             resource_tracker.ensure_running()
             tracker_of_loky.ensure_running()
@@ -132,14 +132,14 @@ class Place:
         descriptor, name = tempfile.mkstemp(prefix="swarm-")
         os.close(descriptor)
         self._printed = Path(name)
-        # The end of the process stays open here: loky may replace a process that has grown much.
+        # The process's end of the pipe stays open here: loky may replace a process that has grown much.
         self._line, self._far_end = multiprocessing.Pipe()
         self.executor = loky.ProcessPoolExecutor(
             1, initializer=_begin, initargs=(self._far_end, self._printed), env=_SAFE
         )
 
     def messages(self) -> Iterator[dict[str, Any]]:
-        """What has come from the process."""
+        """Yield the messages that have come from the process."""
         while self.executor is not None and self._line.poll():
             message = self._line.recv()
             self.ready = self.ready or message == _READY
@@ -149,11 +149,11 @@ class Place:
     def tell(self, token: str) -> None:
         """Ask the process to stop the jobs of a fleet."""
         if self.executor is not None:
-            with contextlib.suppress(OSError):  # it has died, which its future says
+            with contextlib.suppress(OSError):  # a dead process, which its future reports
                 self._line.send(token)
 
     def death(self, message: str) -> str:
-        """The end of the process, in a sentence."""
+        """Describe the end of the process in a sentence."""
         printed = self._printed.read_bytes()[-_LAST:].decode(errors="replace").strip().splitlines()
         last = f"; the last that it printed: {printed[-1]}" if printed else ""
         found = _EXIT.search(message)
@@ -192,7 +192,7 @@ def _safe_path() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """Start processes that Ctrl-C in a terminal does not reach: they inherit what is blocked here."""
+    """Start processes that Ctrl-C in a terminal does not reach: they inherit the blocked signals."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
@@ -204,7 +204,7 @@ def _without_interrupts() -> Iterator[None]:
 
 
 def _remove(printed: Path) -> None:
-    """Remove the file of a process; Windows does not while the process has it open."""
+    """Remove the output file of a process; this fails on Windows while the process has it open."""
     with contextlib.suppress(OSError):
         printed.unlink()
 
@@ -218,13 +218,13 @@ def _begin(line: "Connection[Any, Any]", printed: Path) -> None:
     """Prepare the process: it takes requests to stop, and ends with its parent."""
     global _line
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # What Python and libraries print; also the last words of a process that crashes.
+    # The output of Python and libraries; also the last words of a process that crashes.
     out = os.open(printed, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     for stream in (1, 2):
         os.dup2(out, stream)
     _line = line
     threading.Thread(target=_listen, args=(line, printed), daemon=True).start()
-    with contextlib.suppress(OSError):  # the parent has ended, which the other thread sees too
+    with contextlib.suppress(OSError):  # the parent has ended, which the other thread notices too
         line.send(_READY)
     with interrupt.importing():
         from . import sweep_run  # noqa: F401  what the jobs need

@@ -1,4 +1,4 @@
-"""The report of a sweep, and of whatever a path is of."""
+"""The report of a sweep, and of a run or folder at any path."""
 
 import os
 import shlex
@@ -20,21 +20,21 @@ def report(
 ) -> "Page":
     """A page of a run, or of a sweep: one file in HTML for any browser, which a notebook shows.
 
-    Of a run it is that of `Trajectory.report`. Of a sweep it has the table of all runs, which a click on a column
-    sorts, with links to their files; graphs of the mean and the spread of the main observables over each parameter; and
-    the sweep file, and how to reproduce it.
+    The page of a run is that of `Trajectory.report`. The page of a sweep has the table of all runs, which a click on a
+    column sorts, with links to their files; graphs of the mean and the spread of the main observables over each
+    parameter; the sweep file; and a command that reproduces it.
 
     Args:
         path: a trajectory, or the folder of a sweep.
-        output: `.html`, where the page is written; None: it is only returned.
+        output: `.html`, where the page is written; None: the page is only returned.
         overwrite: replace an existing file.
 
     Returns:
         A `Page`, which has `html`, the text, and `save(path)`. Links to files are relative to `output`, or to the
-        folder that holds that of the sweep.
+        parent of the sweep's folder.
 
     Raises:
-        SceneError: the path is neither a trajectory nor the folder of a sweep, what is there is damaged, the file
+        SceneError: the path is neither a trajectory nor the folder of a sweep, its content is damaged, the file
             exists or has another suffix, or jinja2, matplotlib or scikit-image is not installed.
         FileError: the file cannot be written.
 
@@ -55,14 +55,14 @@ def report(
 
 
 def page_file(source: Path) -> Path:
-    """The file of the report of a run or a folder, where none is named."""
+    """The default file of the report of a run or a folder."""
     return (
         source.resolve().with_name(f"{source.resolve().name}.html") if source.is_dir() else source.with_suffix(".html")
     )
 
 
 def page_of(source: Path, target: Path | None) -> "Page":
-    """The report of a run or of a folder; its links are as of the file `target`."""
+    """The report of a run or of a folder; its links are relative to the file `target`."""
     with needed_by("a report", "report"):
         from ..pages import of_run as run
     if source.is_dir():
@@ -75,7 +75,7 @@ def page_of(source: Path, target: Path | None) -> "Page":
 
 
 def of_folder(folder: Path, place: Path) -> "Page":
-    """The report of the folder of a sweep: its links are as of a file in the folder `place`."""
+    """The report of the folder of a sweep; its links are relative to the folder `place`."""
     from ..pages.html import Page, filled
     from . import curves
     from .folder import found
@@ -116,7 +116,7 @@ def _given(row: dict[str, Any], sweep: Any) -> str:
 
 
 def _notes(sweep: Any, states: list[str]) -> list[Any]:
-    """Whether the sweep goes on, or was stopped."""
+    """Notes that say whether the sweep is running or was stopped."""
     from ..files.lock import is_written
     from ..words.unfinished import Note
 
@@ -134,7 +134,7 @@ def _notes(sweep: Any, states: list[str]) -> list[Any]:
 
 
 def _command(sweep: Any) -> str:
-    """The command that carries out the sweep again, or "" where its file is not there."""
+    """The command that carries out the sweep again, or "" without a sweep file."""
     if sweep.text is None:
         return ""
     from ..pages.reproduce import plugins_of
@@ -147,7 +147,7 @@ def _command(sweep: Any) -> str:
 
 
 def _link(file: Path, place: Path) -> str:
-    """The address of a file as seen from a folder, or "" if the file does not exist."""
+    """The address of a file relative to a folder, or "" if the file does not exist."""
     if not file.is_file():
         return ""
     try:
@@ -157,7 +157,7 @@ def _link(file: Path, place: Path) -> str:
 
 
 def _cell(value: Any) -> tuple[str, Any]:
-    """A cell as it is shown, and as it is sorted by."""
+    """A cell's text, and its key for sorting."""
     if isinstance(value, float):
         return f"{value:.6g}", repr(value)
     return ("", "") if value is None else (str(value), str(value))

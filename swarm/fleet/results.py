@@ -1,4 +1,4 @@
-"""The results of a sweep: a status file for every run, and one table of all."""
+"""The results of a sweep: a status file for every run, and one table of all runs."""
 
 import csv
 import functools
@@ -22,7 +22,7 @@ Status = dict[str, Any]
 
 
 def final(observables: dict[str, Any]) -> dict[str, int | float]:
-    """The observables of the last frame, numbers by name: momentum_x, impulse_0, wall_position_0_x."""
+    """The observables of the last frame as numbers by name: momentum_x, impulse_0, wall_position_0_x."""
     return {name: column[-1].item() for name, column in flattened(observables).items()}
 
 
@@ -43,7 +43,7 @@ class Results:
 
     Args:
         plan: the runs.
-        folder: of all files.
+        folder: the folder of all files.
         table: "csv" or "parquet".
     """
 
@@ -59,22 +59,22 @@ class Results:
         return self.folder / f"{variant.stem}.h5"
 
     def impacts(self, variant: Variant) -> Path | None:
-        """Its log of impacts, or None."""
+        """The log of impacts of a run, or None."""
         return self.folder / f"{variant.stem}.impacts.h5" if variant.has_impacts else None
 
     def status_file(self, variant: Variant) -> Path:
-        """The file that notes its end."""
+        """The file with the outcome of a run."""
         return self.folder / f"{variant.stem}.json"
 
     def find(self) -> None:
-        """Take up what the status files of the folder say."""
+        """Read the status files of the folder."""
         for variant in self.plan.variants:
             # Without a whole status file the state of the run is read from its trajectory.
             if (status := status_in(self.status_file(variant))) is not None:
                 self._statuses[variant.stem] = {key: one for key, one in status.items() if key != "parameters"}
 
     def require_own(self) -> None:
-        """Raise a SceneError if the sweep would replace a file that was not made by a sweep."""
+        """Raise a SceneError if the sweep would replace a file that no sweep has made."""
         for path, what in ((self.path, "table"), (self.folder / KEPT, "sweep file")):
             if path.exists() and not (what == "sweep file" and self._is_kept(path)):
                 marks.require_own(path, what)
@@ -86,7 +86,7 @@ class Results:
                 marks.require_own(file, "status")
 
     def _is_kept(self, path: Path) -> bool:
-        """Whether a sweep file in the folder is that of the plan, or one that a sweep in this folder has left."""
+        """Whether a sweep file in the folder is that of the plan, or one that an earlier sweep left there."""
         try:
             same = path.read_bytes() == self.plan.path.read_bytes()
         except OSError:
@@ -103,7 +103,7 @@ class Results:
         )
 
     def remove(self) -> None:
-        """Remove the files of the plan's runs, which begin anew."""
+        """Remove the files of the plan's runs, which start again."""
         self._statuses.clear()
         for variant in self.plan.variants:
             files = (self.status_file(variant), paths.checkpoint_of(self.trajectory(variant)), self.trajectory(variant))
@@ -117,19 +117,19 @@ class Results:
             file.write(self.plan.path.read_bytes())
 
     def add(self, variant: Variant, status: Status) -> None:
-        """Note the end of a run."""
+        """Write the outcome of a run."""
         with replaced(self.status_file(variant), "status") as file:
             noted = {"parameters": variant.parameters, **status}
             file.write((json.dumps(noted, indent=1, default=str) + "\n").encode())
         self._statuses[variant.stem] = status
 
     def of_state(self, state: str) -> list[tuple[Variant, Status | None]]:
-        """The runs that are "done", "failed", or "waiting" (have not ended), and what is known of them."""
+        """The runs that are "done", "failed", or "waiting" (have not ended), and their statuses."""
         every = [(variant, self._statuses.get(variant.stem)) for variant in self.plan.variants]
         return [(variant, status) for variant, status in every if (status["state"] if status else "waiting") == state]
 
     def others(self) -> list[str]:
-        """The runs in the folder that the plan does not have."""
+        """The runs in the folder that are not in the plan."""
         mine = {variant.stem for variant in self.plan.variants}
         there = {path.stem for path in self.folder.glob("*.h5") if STEM.fullmatch(path.stem)}
         return sorted(there - mine)
@@ -167,7 +167,7 @@ class Results:
 
 
 def status_in(file: Path) -> Status | None:
-    """The content of a status file; None if there is no whole one."""
+    """The content of a status file; None if it is missing or incomplete."""
     try:
         status = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -177,7 +177,7 @@ def status_in(file: Path) -> Status | None:
 
 
 def _is_status(path: Path) -> bool:
-    """Whether a file notes the end of a run; one that was cut off is taken for one."""
+    """Whether a file is a status file; an incomplete one counts."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except ValueError:
@@ -186,7 +186,7 @@ def _is_status(path: Path) -> bool:
 
 
 def require_written(table: str) -> None:
-    """Raise a SceneError if the packages that write such a table are missing."""
+    """Raise a SceneError if a package that writes this kind of table is missing."""
     if table == "parquet":
         with needed_by("a table in Parquet", "parquet"):
             import pandas  # noqa: F401
@@ -194,12 +194,12 @@ def require_written(table: str) -> None:
 
 
 def _columns(rows: list[dict[str, Any]]) -> list[str]:
-    """The names of all columns, in the order in which they first come."""
+    """The names of all columns, in the order of their first occurrence."""
     return list(dict.fromkeys(name for row in rows for name in row))
 
 
 def _written_as(values: list[Any]) -> Callable[[Any], Any]:
-    """The function that makes values of one type of those of a column; JSON where no column holds them."""
+    """The function that converts the values of a column to one type; to JSON if no type of column holds them."""
     kinds = {_type_of(value) for value in values}
     if kinds == {"whole", "number"}:
         return float

@@ -1,16 +1,16 @@
-"""The code of users that workers of a cluster are sent: that of modules which are not installed."""
+"""The code of users that is sent to the workers of a cluster: modules that are not installed."""
 
 import sys
 from types import ModuleType
 
 from ..serialization import plugins
 
-# What this process has taken: a module is made once, as an import makes it.
+# Modules that this process has taken: a module is created once, as by an import.
 _taken: set[bytes] = set()
 
 
 def send_code() -> list[str]:
-    """Let cloudpickle send the code of the plugins that are not installed, packages included; the modules' names."""
+    """Let cloudpickle send the code of plugins that are not installed, and their packages; return their names."""
     import cloudpickle
 
     names = plugins.not_installed()
@@ -23,21 +23,21 @@ def send_code() -> list[str]:
 
 
 def _without_caches(name: str, module: ModuleType) -> None:
-    """Delete what msgspec keeps in the classes of a module that it made objects of: it cannot be pickled."""
+    """Delete msgspec's caches in the classes of a module of which it made objects: they cannot be pickled."""
     for kind in vars(module).values():
         if isinstance(kind, type) and kind.__module__ == name and "__msgspec_cache__" in vars(kind):
             del kind.__msgspec_cache__  # type: ignore[attr-defined]
 
 
 def pickled() -> bytes:
-    """The plugins that are not installed."""
+    """Return the plugins that are not installed as bytes."""
     import cloudpickle
 
     return bytes(cloudpickle.dumps({name: sys.modules[name] for name in send_code()}))
 
 
 def take(modules: bytes) -> None:
-    """Let this process import `pickled` modules that it does not have."""
+    """Let this process import modules from `pickled` that it does not have."""
     import pickle
 
     if modules not in _taken:

@@ -1,13 +1,13 @@
 """A run on a cluster, from the side of the client: it hands out shards, waits for them and joins their files.
 
-What a thousand workers do, from what 200 shards on two workers take (`python -m bench cluster`). Particles do not pass
-through the scheduler: a task is a name, a number and a folder, its answer two words, a report some 100 bytes, of which
-all shards together send 100 a second at most. A shard takes 4 ms of the scheduler's processor, reports included: a
+The costs for a thousand workers, from those of 200 shards on two workers (`python -m bench cluster`). Particles do not
+pass through the scheduler: a task is a name, a number and a folder, its answer two words, a report about 100 bytes,
+and all shards send at most 100 reports a second. A shard takes 4 ms of the scheduler's processor, reports included: a
 thousand take 4 s of a run of any length. In a frame a particle takes 56 bytes (position, velocity, impacts; 32 in
 float32) and 0.5 byte of sums, which each worker writes to a file of its own: 10^9 particles are 56 GB a frame, and the
 storage is the slowest part; `frames = k` keeps fewer. Next is the client, which makes, checks and writes the start (56
 bytes a particle), reads the end (64 bytes), and opens the file of each shard to join it. A shard begins and ends with
-about 0.05 s of its own, a worker with some seconds of imports.
+about 0.05 s of overhead, a worker with a few seconds of imports.
 """
 
 import dataclasses
@@ -35,23 +35,23 @@ from ..run.session import Session
 from . import connection, jobs, joined, shards
 from .jobs import PATIENCE, JobEnd, Reporter, session_of
 
-# Seconds between checkpoints of a shard if the options give no time; and between looks at the frames of the shards.
+# Seconds between checkpoints of a shard if the options give none; and between looks at the frames of the shards.
 _SAVED, _FOLLOWS = 60.0, 1.0
-# To read frames of many shards takes at most about this part of the time.
+# The largest part of the time that is spent on reading frames of many shards.
 _READING = 0.1
 
 
 class Sharded(Session):
-    """As `Session`; its checkpoint holds the bounds of the shards, which have checkpoints of their own."""
+    """A session whose checkpoint holds the bounds of the shards, which have checkpoints of their own."""
 
-    # Those of the session before, or of this one once it has begun.
+    # The bounds of the previous session, or of this one once it has begun.
     _bounds: Any = None
 
     def prepare_shards(self, task: Task) -> None:
-        """Find where this session starts, as `Session.prepare`.
+        """Find the start of this session, as `Session.prepare` does.
 
         Raises:
-            SceneError, CompleteError, FileError: as there.
+            SceneError, CompleteError, FileError: as by `Session.prepare`.
         """
         self._hold(task, None)
         self._times = np.array([task.options.times.until, task.options.times.every])
@@ -72,7 +72,7 @@ class Sharded(Session):
         if checkpoint.SHARDS not in arrays:
             raise SceneError(f"{path} is of a run without a cluster; resume it without one")
         saved.require_same(self._job, path)
-        # Sums that the shards have written have rows of walls too.
+        # Sums in the files of shards have rows of walls too.
         checkpoint.require_owners(path, arrays, self._owners)
         if (was := arrays["times"]).tolist() != self._times.tolist():
             raise SceneError(
@@ -83,11 +83,11 @@ class Sharded(Session):
 
     @property
     def end(self) -> float:
-        """When the wall time limit is reached [s of time.monotonic]."""
+        """The time when the wall time limit is reached [s of time.monotonic]."""
         return self._end
 
     def begin(self, task: Task, count: int) -> tuple[Path, list[int]]:
-        """The folder of the shards and their bounds, those of the session before or so many new ones."""
+        """Prepare the folder of the shards; return it, and the bounds of the last session or of `count` new shards."""
         folder = paths.shards_of(self._trajectory)
         if self._bounds is None:
             self._bounds = shards.bounds_of(task.count, count)
@@ -98,23 +98,23 @@ class Sharded(Session):
         return folder, self._bounds
 
     def keep(self, frame: int, moment: float) -> None:
-        """Save what a later session needs besides the checkpoints of the shards."""
+        """Save the data that a later session needs besides the checkpoints of the shards."""
         job = dataclasses.replace(self._job, frame=frame, time=moment, wall_time=self.wall_time())
         checkpoint.save(
             self._path, job, {checkpoint.SHARDS: np.array(self._bounds), "times": self._times}, self._owners
         )
 
     def finish(self) -> None:
-        """Remove what only an unfinished run needs."""
+        """Remove the files that only an unfinished run needs."""
         paths.checkpoint_of(self._trajectory).unlink(missing_ok=True)
         shards.tidy(paths.shards_of(self._trajectory), len(self._bounds) - 1)
 
 
 def carry_out(task: Task, session: Sharded) -> Result:
-    """Carry out a run that is checked, on the cluster of its options.
+    """Carry out a checked run on the cluster of its options.
 
     Raises:
-        SceneError: the run cannot be one on a cluster, or the cluster cannot carry it out; nothing has run.
+        SceneError: the run cannot be on a cluster, or the cluster cannot carry it out; no shard has run.
         RunError: a shard failed.
         KeyboardInterrupt, WallTimeError: it was stopped; its shards have saved their checkpoints.
     """
@@ -143,7 +143,7 @@ def carry_out(task: Task, session: Sharded) -> Result:
 
 
 def shards_of(task: Task, threads: int) -> int:
-    """How many there are, of a cluster with so many threads."""
+    """The number of shards on a cluster with this number of threads."""
     return 1 if task.is_coupled else task.options.shards or threads
 
 
@@ -159,7 +159,7 @@ class _Shards:
         self._seen, self._read, self._reading = 0, time.monotonic(), 0.0
 
     def run(self, measures: Measures, stop: jobs.Stop) -> dict[str, NDArray[Any]]:
-        """The observables of all frames, when all shards have ended: they are joined also where some were stopped."""
+        """Run all shards; return the observables of all frames, which are joined also if some shards were stopped."""
 
         def ended(k: int, outcome: jobs.JobEnd) -> None:
             self._done += outcome["state"] == "done"
@@ -191,7 +191,7 @@ class _Shards:
         return f"the shard of {what} {self._bounds[k]} to {self._bounds[k + 1] - 1} failed: "
 
     def _look(self) -> None:
-        """Show how far the shards are on average, and now and then the frames that all of them have."""
+        """Show the mean progress of the shards, and now and then the frames that all of them have."""
         until, now = self._task.options.times.until, time.monotonic()
         for sentence in self._fleet.new_sentences():
             self._show.compiling(f"{sentence}, on a worker")
@@ -202,9 +202,9 @@ class _Shards:
         self._show.within(until * (self._done + sum(self._fleet.shares.values())) / self._count, until)
 
     def _follow(self) -> None:
-        """Show the frames that all shards have by now."""
+        """Show the frames that all shards have so far."""
         if not self._task.options.progress:
-            return  # to read them takes time from workers of this machine
+            return  # reading them would take time from workers of this machine
         until = self._task.options.times.until
         for count, seen, particles in joined.seen_of(self._folder, self._task, self._bounds, self._seen):
             self._show.frame(Frame(self._seen, seen["time"], until, seen, count, particles))
@@ -225,7 +225,7 @@ def run_shard(reporter: Reporter, folder: Path, k: int) -> JobEnd:
         task.options, progress=reporter.display(), resume=resumes, overwrite=not resumes, threads=1
     )
     with session_of(options, reporter.token) as session:
-        # The system of a worker that died may still hold it.
+        # The system of a worker that died may still hold the lock.
         with only_writer(target, patience=PATIENCE):
             pass
         end = machine.carry_out_task(dataclasses.replace(task, options=options), session)

@@ -1,10 +1,10 @@
 """Shards: contiguous ranges of the particles, or bodies, of a run, each an ordinary run with files of its own.
 
-Where particles depend on one another the run is one shard.
+If particles depend on one another, the run is one shard.
 
-Beside RUN.h5 they are in the folder RUN.shards: what is run and its start, which the client writes once, and of shard k
-its trajectory k.h5, its checkpoint and its end. Workers read the start there: a worker that takes the place of another
-needs nothing from the client, and the scheduler carries short messages only.
+They are in the folder RUN.shards beside RUN.h5: the inputs of the run and its start, which the client writes once, and
+of shard k its trajectory k.h5, its checkpoint and its end. Workers read the start there: a worker that replaces another
+one needs no data of the client, and the scheduler carries short messages only.
 """
 
 import dataclasses
@@ -31,7 +31,7 @@ from ..state import Multipliers
 from . import sent_modules
 
 _BIRTHS = ("birth_time", "birth_source")
-# Arrays of a result: times that are left out where no particle has one, and others.
+# Arrays of a result: times that are left out if no particle has one, and others.
 _TIMES, _ENDS = ("escape_time", "absorbed_time"), ("impacts_per_particle", "birth_time", "collisions_per_particle")
 
 
@@ -45,8 +45,8 @@ class Whole(NamedTuple):
     bounds: list[int]  # shard k has the particles, or bodies, from bounds[k] to bounds[k + 1]
     start: str
     scales: tuple[float, float]
-    volume: float | None  # that the particles were filled into [m^3]
-    balls: tuple[Any, ...]  # the sources, where they are of balls
+    volume: float | None  # the volume that the particles were filled into [m^3]
+    balls: tuple[Any, ...]  # the sources of balls
 
 
 def file_of(folder: Path, k: int) -> Path:
@@ -55,12 +55,12 @@ def file_of(folder: Path, k: int) -> Path:
 
 
 def end_of(folder: Path, k: int) -> Path:
-    """The file with the end of shard k, which is there when it is complete."""
+    """The file with the end of shard k, which exists when it is complete."""
     return folder / f"{k:04}.end"
 
 
 def bounds_of(n: int, shards: int) -> list[int]:
-    """Bounds of so many shards of n particles, or of fewer: each begins a chunk of them.
+    """Bounds of this number of shards of n particles, or of fewer; each shard begins with a chunk of particles.
 
     >>> bounds_of(1000, 2)
     [0, 512, 1000]
@@ -74,7 +74,7 @@ def bounds_of(n: int, shards: int) -> list[int]:
 
 
 def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
-    """Write what is run, and its start."""
+    """Write the inputs of the run, and its start."""
     import cloudpickle
 
     sent_modules.send_code()
@@ -94,10 +94,10 @@ def prepare(folder: Path, task: Task, bounds: list[int], start: str) -> None:
 
 
 def clear(folder: Path) -> None:
-    """Remove the files of an earlier run from the folder, or make it.
+    """Remove the files of an earlier run from the folder, or create it.
 
     Raises:
-        SceneError: it holds something else.
+        SceneError: it holds other files.
     """
     folder.mkdir(exist_ok=True)
     ours = [path for path in folder.iterdir() if path.is_file() and _is_ours(path)]
@@ -111,7 +111,7 @@ def clear(folder: Path) -> None:
 
 
 def _is_ours(path: Path) -> bool:
-    """Whether a file of the folder is one of a run; what has the name of a trajectory must be one."""
+    """Whether a file of the folder belongs to a run; a file with the name of a trajectory must be one."""
     word, suffix = path.stem.partition(".")[0], path.suffix
     if paths.is_temporary(path.name):
         return True
@@ -121,7 +121,7 @@ def _is_ours(path: Path) -> bool:
 
 
 def tidy(folder: Path, count: int) -> None:
-    """Remove what only the run needed: all but the trajectories."""
+    """Remove the files that only the run needed: all except the trajectories."""
     kept = {file_of(folder, k) for k in range(count)}
     for path in folder.iterdir():
         if path not in kept:
@@ -161,14 +161,14 @@ def task_of(folder: Path, k: int) -> Task:
 
 
 def write_end(path: Path, end: Result) -> None:
-    """Write how a shard ended."""
+    """Write the end of a shard."""
     particles, multipliers = end.particles, end.multipliers
     arrays = {name: getattr(particles, name) for name in ("position", "velocity", "image", "spin")}
     arrays |= {name: getattr(end, name) for name in _ENDS}
     arrays |= {name: times for name in _TIMES if not np.isnan(times := getattr(end, name)).all()}
     arrays |= {} if multipliers is None else {f"multipliers.{k}": rows for k, rows in multipliers._asdict().items()}
     arrays = {name: array for name, array in arrays.items() if array is not None}
-    # One behind the other: an archive of NumPy has checksums, which take three times as long.
+    # Arrays in sequence: an archive of NumPy has checksums, which take three times as long.
     with replaced(path, "end of a shard") as file:
         for array in (np.array(list(arrays)), *arrays.values()):
             np.save(file, array)
@@ -178,14 +178,14 @@ def write_end(path: Path, end: Result) -> None:
 
 
 def joined_end(folder: Path, task: Task, bounds: list[int]) -> Result:
-    """The end of all shards; without observables and wall time."""
+    """The end of all shards, without observables and wall time."""
     n = bounds[-1]
     whole: dict[str, NDArray[Any]] = {name: np.full((len(task.particles) // n, n), np.nan) for name in _TIMES}
     for k, (first, last) in enumerate(itertools.pairwise(bounds)):
         with open(end_of(folder, k), "rb") as file:
             for name in np.load(file).tolist():
                 part = np.load(file)
-                # Of bodies point p of copy i is particle p n + i.
+                # For bodies, point p of copy i is particle p n + i.
                 points = part.shape[-1] // (last - first)
                 if name not in whole:
                     whole[name] = np.empty((*part.shape[:-1], points, n), part.dtype)

@@ -18,7 +18,7 @@ from .results import final, of_trajectory
 
 
 class RunOrder(NamedTuple):
-    """A run: its scene file and where that is, the files that it writes, its threads, and the code that it names."""
+    """A run: its scene file and the path of that, the files that it writes, its threads, and the code that it names."""
 
     text: str
     source: Path
@@ -30,9 +30,9 @@ class RunOrder(NamedTuple):
 
 
 def run_variant(reporter: Reporter, order: RunOrder) -> JobEnd:
-    """Carry out a run, or go on with it: from its checkpoint if it has one, else from the start."""
+    """Carry out a run, or resume it: from its checkpoint if it has one, else from the start."""
     target = order.trajectory
-    # A worker that ends because its parent was killed may still hold it.
+    # A worker that ends because its parent was killed may still hold the lock.
     with only_writer(target, patience=PATIENCE):
         pass
     if order.modules is not None:
@@ -42,10 +42,10 @@ def run_variant(reporter: Reporter, order: RunOrder) -> JobEnd:
     if target.exists():
         before = of_trajectory(target, job.run.until)
         if before is not None:
-            paths.checkpoint_of(target).unlink(missing_ok=True)  # a kill came between the last frame and this
+            paths.checkpoint_of(target).unlink(missing_ok=True)  # a kill came before the checkpoint was removed
             return {"observables": before}
         if paths.checkpoint_of(target).exists():
-            # A SceneError: it is damaged, or of another version. The run begins anew, and says what else is wrong.
+            # A SceneError: the file is damaged, or of another version. The run starts again, and raises further errors.
             with contextlib.suppress(SceneError):
                 return _simulated(job, order, reporter, resumes=True)
     return _simulated(job, order, reporter, resumes=False)

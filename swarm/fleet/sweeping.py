@@ -1,4 +1,4 @@
-"""A sweep as a whole: its file, its folder, the fleet that carries it out, and its table."""
+"""A sweep as a whole: its file, its folder, its fleet, and its table."""
 
 import contextlib
 import math
@@ -29,15 +29,15 @@ from .sweep_run import RunOrder, run_variant
 if TYPE_CHECKING:
     import pandas as pd
 
-# The table is written during a sweep so often at most [s], and so much longer than it takes to write.
+# The table is written during a sweep after this time [s] at least, and after this multiple of the time to write it.
 _TABLE_EVERY, _TABLE_SHARE = 10.0, 50.0
-# Seconds of which the pace gives the ETA: several runs.
+# The window of the pace for the ETA [s]: several runs.
 _WINDOW = 120.0
 
 
 @dataclass(frozen=True)
 class SweepOptions(Validated):
-    """The options of a sweep; `sweep` describes each, `walltime` as of `simulate`."""
+    """The options of a sweep; `sweep` describes each, `walltime` is that of `simulate`."""
 
     folder: str | os.PathLike[str] | None = None
     processes: Count | None = None
@@ -65,7 +65,7 @@ class SweepOptions(Validated):
 
 @dataclass(frozen=True)
 class Outcome:
-    """The end of a sweep: its results, why it was stopped ("interrupted", "walltime") or "", and its seconds."""
+    """The end of a sweep: its results, the reason of a stop ("interrupted", "walltime") or "", and wall time [s]."""
 
     results: Results
     stopped: str
@@ -100,24 +100,24 @@ def sweep(  # noqa: PLR0913  the keywords are the public interface
 
     Args:
         path: the sweep file.
-        folder: of all files, made if it is not there; None: the name of the file without .toml, in the current folder.
+        folder: the folder of all files, made if it is missing; None: named like the file, in the current folder.
         processes: number of worker processes; None: the cores that this process may use.
-        threads: of each run, unless its file says how many; None: the cores for each process, and one on a cluster.
-            Results do not depend on it, nor on `processes`.
-        resume: go on with what the folder holds: runs that are done are not run again, others go on from their
-            checkpoint or begin anew, also those that have failed.
-        overwrite: replace the runs that the folder holds.
+        threads: the threads of each run, unless its file has them; None: the cores for each process, 1 on a cluster.
+            Results depend neither on it nor on `processes`.
+        resume: continue in an existing folder: runs that are done are not run again, others continue from their
+            checkpoint or start again, also those that have failed.
+        overwrite: replace the runs in the folder.
         progress: True for one progress bar of all runs.
         table: the file results.csv or results.parquet in the folder, "csv" or "parquet". It is replaced now and then
             during the sweep, and at its end.
         plugins: the modules with code that the file may name, as "module:Name": laws, surfaces, methods, observables.
-        cluster: where to run, as of `simulate`: None for processes of this machine; "local:N"; the address of a
+        cluster: where to run, as for `simulate`: None for processes of this machine; "local:N"; the address of a
             scheduler of Dask; or a `distributed.Client`. A worker carries out a run for each of its threads. The
             folder, and the files that the scene names, must be on storage that all workers share. The files are the
-            same as without; a run on a worker that died is carried out again, from its checkpoint.
+            same as without a cluster; a run on a worker that died is resumed from its checkpoint.
 
     Returns:
-        The table, a row for each run in the order of the file (of a product the last key changes first): file,
+        The table, a row for each run in the order of the file (in a product the last key changes first): file,
         the keys of the sweep, state ("done", "failed" or "waiting"), error, wall_time [s], and the observables of the
         last frame, vectors as momentum_x, values of surfaces as impulse_0.
 
@@ -147,9 +147,9 @@ def sweep(  # noqa: PLR0913  the keywords are the public interface
 
 
 def carry_out_sweep(path: str | os.PathLike[str], options: SweepOptions, first: Place | None = None) -> Outcome:
-    """Carry out a sweep; an interrupt or the wall time limit ends it with its table written.
+    """Carry out a sweep; after an interrupt or at the wall time limit the table is written too.
 
-    `first` is a process of this machine that may have started.
+    `first` is a process of this machine that may already have started.
     """
     began = time.monotonic()
     require_written(options.table)
@@ -182,7 +182,7 @@ def carry_out_sweep(path: str | os.PathLike[str], options: SweepOptions, first: 
 
 
 def _require_free(results: Results, options: SweepOptions) -> None:
-    """Raise a SceneError if the folder cannot be used, or holds what may not be replaced."""
+    """Raise a SceneError if the folder cannot be used, or has files that may not be replaced."""
     folder = results.folder
     if folder.exists() and not folder.is_dir():
         raise SceneError(f"folder: expected the name of a folder, got the file {folder}")
@@ -201,7 +201,7 @@ def _require_free(results: Results, options: SweepOptions) -> None:
 
 
 class _Runs:
-    """The runs of a plan that are left."""
+    """The remaining runs of a plan."""
 
     def __init__(self, plan: Plan, results: Results, options: SweepOptions, stop: Stop, began: float) -> None:
         self._plan, self._results, self._options, self._stop = plan, results, options, stop
@@ -212,7 +212,7 @@ class _Runs:
         self._pace, self._stops = Pace(_WINDOW), False
 
     def carry_out(self, client: Any, first: Place | None) -> None:
-        """Carry them out, by the workers of a client, or by processes of this machine."""
+        """Carry out the runs, by the workers of a client, or by processes of this machine."""
         fleet: Fleet
         if client is None:
             mine = cores()
@@ -236,7 +236,7 @@ class _Runs:
         )  # fmt: skip
 
     def _note(self, number: int, outcome: dict[str, Any]) -> None:
-        """Note the end of a run, but for one that goes on in the next session."""
+        """Write the outcome of a run, unless the run continues in the next session."""
         if outcome["state"] == "stopped" or (outcome["state"] == "failed" and self._stop.reason):
             return
         about = {"state": "", "error": None, "wall_time": None, "observables": {}} | outcome
@@ -246,7 +246,7 @@ class _Runs:
         self._failed += outcome["state"] == "failed"
 
     def _look(self, fleet: Fleet, show: ProgressListener | None) -> None:
-        """Look at the time, show the progress, if it is shown, and write the table now and then."""
+        """Check the time, show the progress if wanted, and write the table now and then."""
         now = time.monotonic()
         if now >= self._end:
             self._stop.because("walltime")
@@ -264,7 +264,7 @@ class _Runs:
 
 
 def line_of(pace: Pace, runs: int, done: int, failed: int, shares: Collection[float]) -> tuple[float, str]:
-    """The share of all runs that is done, with those of the runs under way, and a line about them with the ETA."""
+    """The progress of all runs, including those under way, and a line about it with the ETA."""
     ended = done + failed
     share = (ended + sum(shares)) / runs
     pace.note(share)
@@ -272,7 +272,7 @@ def line_of(pace: Pace, runs: int, done: int, failed: int, shares: Collection[fl
 
 
 def _in_order(variants: list[Variant]) -> Iterator[Variant]:
-    """The first of each kind, then the others: workers compile the kernels of several kinds at the same time."""
+    """The first variant of each kind, then the others: workers compile kernels of several kinds at the same time."""
     kinds: set[str] = set()
     rest: list[Variant] = []
     for variant in sorted(variants, key=lambda one: one.number):

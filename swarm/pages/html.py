@@ -17,7 +17,7 @@ from ..version import VERSION
 
 _HERE = Path(__file__).parent
 _SUFFIXES = (".html", ".htm")
-# Of what a notebook shows of it [pixels].
+# The height of a page in a notebook [pixels].
 _HEIGHT = 800
 
 
@@ -26,9 +26,9 @@ class Page:
     """A report, which a notebook shows where it is the last line of a cell.
 
     Attributes:
-        title: of the page.
+        title: the title of the page.
         html: the page itself, as text.
-        sources: the files that it is of, which it cannot replace.
+        sources: its source files, which it cannot replace.
     """
 
     title: str
@@ -57,7 +57,7 @@ class Page:
 
 
 def checked_target(path: Any, overwrite: bool, sources: tuple[Path, ...]) -> Path:
-    """The file that a report becomes; a SceneError if it cannot."""
+    """Return the file of a report; raise a SceneError if it cannot be written there."""
     flag("overwrite", overwrite)
     target = paths.target_of("report", path)
     if target.suffix.lower() not in _SUFFIXES:
@@ -68,7 +68,7 @@ def checked_target(path: Any, overwrite: bool, sources: tuple[Path, ...]) -> Pat
 
 
 def written(made: Callable[[], Page], path: Any, overwrite: bool, sources: tuple[Path, ...]) -> Page:
-    """The page that is made, and written where a path is given, which is checked first."""
+    """Make a page, and write it if a path is given, which is checked first."""
     flag("overwrite", overwrite)
     if path is not None:
         checked_target(path, overwrite, sources)
@@ -79,7 +79,7 @@ def written(made: Callable[[], Page], path: Any, overwrite: bool, sources: tuple
 
 
 def filled(template: str, **content: Any) -> str:
-    """A template with its content; what is no `Markup` is text, and is escaped."""
+    """Return a template with its content; a value that is no `Markup` is text, and is escaped."""
     return str(_environment().get_template(template).render(version=VERSION, **content))
 
 
@@ -90,8 +90,8 @@ def _environment() -> Any:
     made = Environment(
         loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    # The page's own style and script, as they are.
+    # The page's own style and script, unescaped.
     made.globals["own"] = lambda name: Markup((_HERE / name).read_text(encoding="utf-8"))
-    # A name may go on in the next line behind a dot and an underscore.
+    # A name may be broken after a dot and an underscore.
     made.globals["breakable"] = lambda name: Markup("<wbr>").join(re.split(r"(?<=[._])", name))
     return made

@@ -16,24 +16,24 @@ from ..words.unfinished import Note, unfinished
 from . import html, pictures, reproduce
 from .html import Page, filled
 
-# Of the first screen: the most numbers, and the most surfaces.
+# The largest number of numbers, and of surfaces, on the first screen.
 _NUMBERS, _SURFACES = 4, 3
 
 
 class Answer(NamedTuple):
-    """Whether a run went well, in words."""
+    """The verdict on a run, in words."""
 
     text: str
     holds: bool
 
 
 def report(trajectory: Any, path: Any, overwrite: bool) -> Page:
-    """The report of a `Trajectory`, which is written where a path is given; see `Trajectory.report`."""
+    """Make the report of a `Trajectory`, and write it if a path is given; see `Trajectory.report`."""
     return html.written(functools.partial(of_trajectory, trajectory), path, overwrite, (trajectory.path,))
 
 
 def report_of_content(content: Content, wall_time: float, path: Any, overwrite: bool) -> Page:
-    """The report of a run that wrote no trajectory, which is written where a path is given."""
+    """Make the report of a run that wrote no trajectory, and write it if a path is given."""
     return html.written(functools.partial(of_content, content, wall_time), path, overwrite, ())
 
 
@@ -41,7 +41,7 @@ def of_trajectory(trajectory: Any) -> Page:
     """The report of a `Trajectory`.
 
     Raises:
-        SceneError: it is damaged, or holds no frame.
+        SceneError: it is damaged, or has no frame.
     """
     trajectory.require_frames()
     content, makers, wall_times = content_of(trajectory), trajectory.makers, trajectory.wall_times
@@ -55,7 +55,7 @@ def of_trajectory(trajectory: Any) -> Page:
 
 
 def of_content(content: Content, wall_time: float) -> Page:
-    """The report of a run that has written no trajectory, which took so many seconds."""
+    """The report of a run without a trajectory, with its wall time [s]."""
     from ..files.provenance import makers
 
     why = "It cannot be reproduced from this page: it was run in Python and has written no trajectory; keep the script."
@@ -65,7 +65,7 @@ def of_content(content: Content, wall_time: float) -> Page:
 
 
 def _filled(content: Content, spent: float | None, about: str, notes: list[Note], speed: Any, again: Any) -> str:
-    """The page of a run that took so many seconds, if that is known."""
+    """The page of a run, with the wall time `spent` [s] if it is known."""
     return filled(
         "run.html.j2",
         title=words.title(content),
@@ -82,7 +82,7 @@ def _filled(content: Content, spent: float | None, about: str, notes: list[Note]
 
 
 def _first_screen(content: Content, spent: float | None) -> dict[str, Any]:
-    """What a page has without scrolling: whether the run went well, what happened, and what it was, in short."""
+    """The part of a page that is visible without scrolling: verdict, counts, and setting, in short."""
     judged = verdicts.judged(content)
     happened = [(one.label, one.text) for one in facts.of_numbers(content.seen)[:_NUMBERS]]
     what = [(one.label, one.text) for one in facts.of_setting(content, _SURFACES)]
@@ -95,7 +95,7 @@ def _first_screen(content: Content, spent: float | None) -> dict[str, Any]:
 
 
 def _answer(judged: Sequence[Statement]) -> Answer:
-    """One of the judgements, in short."""
+    """The verdict that sums up the checks."""
     checked = [one.verdict for one in judged if one.verdict is not None]
     failed = checked.count(False)
     if failed:
@@ -113,7 +113,7 @@ def _when(makers: dict[str, str], path: Path) -> list[str]:
 
 
 def _speed(content: Content, spent: float | None, threads: int | None) -> list[tuple[str, str]]:
-    """What the run took, as far as is known."""
+    """The wall time of a run and its pace, as far as known."""
     if spent is None:
         return [("wall time", "not kept: an older version of swarm, or a cluster, has written the file")]
     events = float(content.seen["impacts"][-1]) + float(content.seen.get("collisions", [0.0])[-1])
@@ -124,7 +124,7 @@ def _speed(content: Content, spent: float | None, threads: int | None) -> list[t
 
 
 def _versions(makers: dict[str, str], seed: int | None) -> list[tuple[str, str]]:
-    """What the run was computed with."""
+    """The versions of the software, and the machine, of a run."""
     names = {"version": "swarm", "python": "Python", "numpy": "NumPy", "numba": "Numba", "hdf5": "HDF5"}
     rows = [(title, makers[name]) for name, title in names.items() if name in makers]
     rows += [("machine", makers["machine"])] if "machine" in makers else []
@@ -132,7 +132,7 @@ def _versions(makers: dict[str, str], seed: int | None) -> list[tuple[str, str]]
 
 
 def require_trajectory(path: Path) -> None:
-    """Raise a SceneError if a file is a log of impacts, of which there is no report."""
+    """Raise a SceneError if a file is a log of impacts, which has no report."""
     from ..files.stored import is_log
 
     if is_log(path):

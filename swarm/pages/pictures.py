@@ -15,16 +15,16 @@ from ..pictures.drawn import Drawn
 from ..words.amounts import amount, many
 from ..words.content import Content
 
-# Of a graph, and of a picture of particles [inches]; pixels an inch of the latter, and most particles in it.
+# Sizes of a graph and of a picture of particles [inches]; pixels an inch and the number of particles of the latter.
 _GRAPH, _PLACES, _DPI, _SHOWN = (5.0, 2.8), (4.4, 3.15), 240, 5000
-# Graphs with more characters of SVG than this, those of very many frames, are PNG, so that a page stays small.
+# Larger graphs [characters of SVG], those of very many frames, are PNG, so that a page stays small.
 _LARGEST = 120_000
-# Colours of the light style -> those of the page in their place.
+# Colours of the light style -> the colours of the page that replace them.
 _COLOURS = {"#222222": "var(--ink)", "#8a8a8a": "var(--faint)", "#e6e6e6": "var(--grid)", "#ffffff": "var(--card)"}
 
 
 class PagePicture(NamedTuple):
-    """A picture, what it shows in words, and whether it is wide."""
+    """A picture, its content in words, and whether it is wide."""
 
     picture: Markup
     caption: str
@@ -32,7 +32,7 @@ class PagePicture(NamedTuple):
 
 
 def of_places(content: Content) -> list[PagePicture]:
-    """The particles, or bodies, among their walls, at the start and at the end, as far as they are kept."""
+    """The particles, or bodies, among their walls, at the start and at the end, if they are kept."""
     times, found = content.seen["time"], []
     for name, k in (("start", 0), ("end", -1)):
         if name in content.frames:
@@ -43,7 +43,7 @@ def of_places(content: Content) -> list[PagePicture]:
 
 
 def _how_many(content: Content, name: str) -> str:
-    """How many of the particles, or bodies, of a frame are drawn, where that is not all."""
+    """The number of drawn particles, or bodies, of a frame, if it is not that of all."""
     drawn = Drawn(len(content.frames[name]), content.body, _SHOWN)
     if drawn.shown == drawn.count:
         return ""
@@ -59,7 +59,7 @@ def _placed(content: Content, name: str, k: int, dark: bool) -> Any:
 
 
 def of_series(content: Content) -> list[PagePicture]:
-    """The time series that say something, a graph each, and the speeds."""
+    """The informative time series, a graph each, and the speeds."""
     found = []
     for title, draw in plots.graphs_of(content):
         with style.applied():
@@ -92,7 +92,7 @@ def svg(figure: Any, description: str) -> Markup:
 
 
 def _png(make: Any, description: str, variants: bool = True) -> Markup:
-    """A figure as PNG, light and dark; `make` draws it in the style that is applied."""
+    """A figure as PNG, light and dark; `make` draws it in the current style."""
     data = []
     for dark in (False, True) if variants else (False,):
         buffer = io.BytesIO()
@@ -107,7 +107,7 @@ def _png(make: Any, description: str, variants: bool = True) -> Markup:
 
 
 def _smaller(buffer: io.BytesIO) -> bytes:
-    """The PNG with 256 colours where that is smaller, else as it is."""
+    """The PNG, with 256 colours if that is smaller."""
     from PIL import Image  # which matplotlib brings
 
     whole, made = buffer.getvalue(), io.BytesIO()

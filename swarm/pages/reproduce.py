@@ -1,4 +1,4 @@
-"""How to carry out a run again: by its scene file, or from its own first frame."""
+"""The ways to carry out a run again: by its scene file, or from its own first frame."""
 
 import re
 import shlex
@@ -14,7 +14,7 @@ from ..serialization.tables import FILES, NamedMethod, files_in, texts_in
 
 # User code in a scene file, and the keys of files.
 _CODE = re.compile(r"([A-Za-z_][\w.]*):[A-Za-z_]\w*")
-# What stands for a long array, which a scene file does not have.
+# The text in place of a long array, which a scene file does not have.
 _ARRAY = "sha256:"
 _SAME = (
     "The result has the same bits with any number of threads; another version of swarm, or of what it computes with, "
@@ -27,10 +27,10 @@ class Again(NamedTuple):
 
     Attributes:
         notes: sentences about them, in order.
-        command: of a shell, or "".
+        command: the command of a shell, or "".
         scene_file: the text of the scene file that the command runs, or "".
         file_name: the name of that file, or a description of it.
-        python: the same in Python, or "".
+        python: the code that does this in Python, or "".
     """
 
     notes: list[str]
@@ -94,7 +94,7 @@ def plugins_of(document: Any) -> str:
 
 
 def _hindrance(trajectory: Any) -> str:
-    """Why a run cannot go on from the first frame of its trajectory, in a sentence; "" if it can."""
+    """The reason why a run cannot start from the first frame of its trajectory, in a sentence; "" if it can."""
     kept, cannot = _storage(trajectory), "It cannot be reproduced from this file alone: "
     if kept.frames == "none":
         return f"{cannot}it was run in Python, and the file keeps no particles; keep the script that made it."

@@ -1,4 +1,4 @@
-"""Balls in the plane of a scene of two dimensions, as large as they are, discs; and the size and colours of dots."""
+"""Balls in the plane of a scene of two dimensions as discs of their size; and the size and colours of dots."""
 
 from typing import Any
 
@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from ..state import Floats
 
-# The edge of a disc [points], and the part of its colour.
+# The width of the edge of a disc [points], and its brightness relative to the disc.
 _EDGE, _DARK = 0.4, 0.5
-# Dots of all particles cover this many square points of a picture, a dot at least and at most.
+# All dots together cover about this many square points of a picture; the smallest and the largest size of a dot.
 _DOTS, _SMALL, _LARGE = 2.5e4, 0.3, 24.0
 
 
@@ -28,18 +28,18 @@ class Discs(EllipseCollection):
         axes.add_collection(self, autolim=False)
 
     def paint(self, colour: Any) -> None:
-        """Give them colours (n, 3), or one."""
+        """Set the colours of the discs: (n, 3), or one for all."""
         rows: Any = colours_of(colour, self._count)
         self.set_facecolor(rows)
         self.set_edgecolor(_DARK * rows)
 
 
 def size_of_dots(count: int) -> float:
-    """The size of each of so many dots [square points]."""
+    """The size of each dot in a picture of `count` dots [square points]."""
     return float(np.clip(_DOTS / max(1, count), _SMALL, _LARGE))
 
 
 def colours_of(colour: Any, n: int) -> Floats:
-    """Colours (n, 3) from those, or from one."""
+    """Return colours (n, 3), also from one colour for all."""
     rows: ArrayLike = [to_rgb(colour)] if isinstance(colour, str) else colour
     return np.broadcast_to(np.asarray(rows, np.float64)[:, :3], (n, 3))

@@ -1,4 +1,4 @@
-"""Colours of particles by speed or by energy error: from dark blue, small, to orange, large."""
+"""Colours of particles by speed or by energy error: from dark blue for small to orange for large values."""
 
 import math
 from collections.abc import Callable
@@ -20,7 +20,7 @@ Values = Callable[[Floats, Floats], Floats]
 
 BACKGROUND = (255, 255, 255)
 
-# Plasma (https://bids.github.io/colormap) from 6 % to 80 %: all of it is seen on a light background and on a dark one.
+# Plasma (https://bids.github.io/colormap) from 6 % to 80 %: all of it is visible on a light and on a dark background.
 # It goes from dark to light with every kind of colour vision.
 _TABLE = np.array(
     [
@@ -32,9 +32,9 @@ _TABLE = np.array(
 # The palette of Okabe and Ito, distinct with every kind of colour vision; also in look.mplstyle.
 BLUE, RED, GREEN, PINK, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 CURVES = (BLUE, RED, GREEN, PINK, ORANGE, SKY)
-# The sum of all where the background is not known: it is seen on a light one and on a dark one.
+# The sum of all, on an unknown background: this grey is visible on a light and on a dark one.
 SUM, _PURPLE, _BROWN = "#8A8A8A", "#5E3C99", "#8C510A"
-# The colour of an energy in every picture, by how the name of its curve begins. The total is of the colour of text.
+# The colour of an energy in every picture, by the beginning of its curve's name. The total has the colour of text.
 ENERGIES = {
     "kinetic": BLUE, "rotational": SKY, "potential": GREEN, "contact": PINK, "elastic": PINK, "dissipated": RED,
     "brought by": ORANGE, "work of": _PURPLE, "energy of": _BROWN,
@@ -43,7 +43,7 @@ ENERGIES = {
 CAVITY, CAVITY_LINE = "#C9D6E2", "#6F8296"
 SOLID, SOLID_LINE = "#E3C9A8", "#A5733C"
 _STEPS = 256
-# The scale ends at this many times the speed of the mean energy at the start.
+# The scale ends at this multiple of the speed of the mean energy at the start.
 _FASTER = 1.5
 # log10 of the relative energy errors at the ends of the scale.
 _DECADES = (-16.0, -6.0)
@@ -68,7 +68,7 @@ class Scale:
 
 
 def curve_colour(name: str, k: int, total: str = SUM) -> str:
-    """The colour of curve k of a plot, by its name where that is an energy.
+    """The colour of curve k of a plot, by its name if it is an energy.
 
     >>> curve_colour("kinetic", 3), curve_colour("ball", 1), curve_colour("total", 0, "black")
     ('#0072B2', '#D55E00', 'black')
@@ -94,7 +94,7 @@ _PACKED: Colours = _RED << 24 | _GREEN << 16 | _BLUE << 8 | 0xFF
 
 
 def named(quantity: str) -> tuple[str, str]:
-    """The name of a quantity and its unit: "speed [m/s]" has both."""
+    """The name and the unit of a quantity such as "speed [m/s]"."""
     name, _, unit = quantity.rstrip("]").partition(" [")
     return name, unit
 
@@ -102,16 +102,16 @@ def named(quantity: str) -> tuple[str, str]:
 def by_speed(scene: Scene, method: Method, start: Particles, last: Particles) -> tuple[Scale, Values]:
     """The scale of speeds in a run, and the speed as a function of positions and velocities (3, N).
 
-    The first frame of a run with sources may hold no particle: the scale is then made from the last one.
+    The first frame of a run with sources may hold no particle: the scale is then made from the last frame.
     """
     return colouring("speed", scene, method, last if np.isnan(start.position[0]).any() else start)
 
 
 def colouring(by: str, scene: Scene, method: Method, start: Particles) -> tuple[Scale, Values]:
-    """The scale, and its quantity as a function of positions and velocities (3, N).
+    """The scale of a quantity, and the quantity as a function of positions and velocities (3, N).
 
     Raises:
-        SceneError: energy errors are asked for where walls dissipate or give energy.
+        SceneError: energy errors are not defined because walls dissipate or give energy.
     """
     law = method.law()
     compiled = scene.compiled(apart=method.apart())

@@ -27,10 +27,10 @@ def frame(
     across: int | None = None,
     radius: Floats | None = None,
 ) -> "Scenery | None":
-    """A frame: particles (N, 3) of colours 0xRRGGBBAA, which bodies with faces do not show, and their ties.
+    """Draw a frame: particles (N, 3) of colours 0xRRGGBBAA, or bodies with faces instead, and their ties.
 
-    Lines (S, 2, 3) have colours (S,), triangles (T, 3, 3) those of their corners (T, 3). `across` is the axis across
-    the plane of a scene of two dimensions; `radius` of balls (n,) [m].
+    Lines (S, 2, 3) have colours (S,), triangles (T, 3, 3) have colours of their corners (T, 3). `across` is the axis
+    normal to the plane of a scene of two dimensions; `radius` is that of balls (n,) [m].
     """
     if across is not None:
         flat.flat(axes, across, points, red_green_blue(packed), shapes, radius=radius)
@@ -43,7 +43,7 @@ def frame(
 
 
 def aspect(shapes: list[Shape], points: Floats, across: int | None) -> float:
-    """The width of a picture as a part of its height."""
+    """The aspect of a picture, its width over its height."""
     found = around(points, shapes)
     if across is not None:
         low, high = flat.ends_in_plane(across, found)
@@ -61,9 +61,9 @@ def colour_bar(
     packed: list[Colours] | None = None,
     values: Floats | None = None,
 ) -> None:
-    """A colour bar for the particles, below these axes; where all have one colour, 0xRRGGBBAA, words; none for none.
+    """Draw a colour bar below the axes; words if all particles have one colour, 0xRRGGBBAA; nothing without particles.
 
-    The words are about the `values` of the particles, or, where these are not known, about those of the colour.
+    The words describe the `values` of the particles or, if these are not known, the values of the colour.
     """
     every = np.unique(np.concatenate(packed)) if packed else np.empty(0, np.uint32)
     there = every[every & 0xFF > 0]
@@ -82,7 +82,7 @@ def colour_bar(
 
 
 def _values_in_words(quantity: str, values: Floats) -> str:
-    """The values of particles that have one colour, in words; NaN marks absent particles."""
+    """The values of particles of one colour, in words; NaN marks absent particles."""
     values = values[~np.isnan(values)]
     least, most = float(values.min()), float(values.max())
     name, unit = named(quantity)
@@ -96,7 +96,7 @@ def _values_in_words(quantity: str, values: Floats) -> str:
 
 
 def _colour_in_words(quantity: str, low: float, high: float, colour: Colours) -> str:
-    """Which values have a colour: those of a step of the scale, or all that are beyond its end."""
+    """The values of a colour, in words: those of a step of the scale, or all beyond its end."""
     far = np.abs(np.asarray(MAP(np.arange(MAP.N)))[:, :3] - red_green_blue(colour)).sum(axis=1)
     step = int(far.argmin())
     ends = [f"{low + k / MAP.N * (high - low):.4g}" for k in (step, step + 1)]

@@ -1,4 +1,4 @@
-"""The particles, or the bodies, of a run that pictures and recordings show."""
+"""The particles or bodies of a run that pictures and recordings show."""
 
 import math
 
@@ -12,26 +12,26 @@ from ..state import Floats, State
 from ..surfaces.rotation import normalized
 from .colours import Colours, Scale, Values
 
-# Triangles with normals that differ by less lie in one face of a polyhedron, without a line between them.
+# Triangles with normals that differ by less are in one face of a polyhedron, without a line between them.
 _FLAT = 1e-6
 
 
 class Drawn:
-    """The particles or bodies that are shown, evenly chosen, and the lines and faces between their points.
+    """The shown particles or bodies, evenly chosen, and the lines and faces between their points.
 
-    A body with faces is shown by its contact points, its faces and the edges between them, another by its points and
-    its bonds.
+    A body with faces is shown by its contact points, its faces and the edges between them, other bodies by their points
+    and bonds.
 
     Attributes:
-        noun: what is shown, "particles" or "bodies"; count: how many there are; shown: how many are shown.
-        lines: (S, 2) and triangles: (T, 3), of the points that are shown.
-        radius: of those that are shown [m], where they are balls, else None.
+        noun: "particles" or "bodies"; count: their number; shown: the number of those that are shown.
+        lines: (S, 2) and triangles: (T, 3), as indices of the shown points.
+        radius: the radii of the shown balls [m], or None.
     """
 
     def __init__(self, points: int, body: Body | None, most: int, radius: Floats | None = None) -> None:
-        """Of `points` particles or points of bodies, at most `most` points are shown, or one body.
+        """Choose at most `most` of `points` particles or points of bodies, or one body.
 
-        `radius` is that of all of them, of balls.
+        `radius` has the radii of all balls.
         """
         self.noun = "particles" if body is None else "bodies"
         size = 1 if body is None else len(body)
@@ -46,12 +46,12 @@ class Drawn:
         self.lines, self.triangles = self._of_all(edges), self._of_all(faces)
 
     def noun_of(self, count: int, plane: str | None) -> str:
-        """What so many of them are: in a scene of two dimensions balls are discs."""
+        """The noun for `count` of the particles or bodies: in a scene of two dimensions balls are discs."""
         noun = self.noun if self.radius is None else "balls" if plane is None else "discs"
         return noun if count != 1 else {"bodies": "body"}.get(noun, noun.removesuffix("s"))
 
     def points(self, rows: Floats) -> Floats:
-        """The points that are shown, from positions or velocities (3, N) of all."""
+        """The shown points, from positions or velocities (3, N) of all."""
         if self._body is None:
             return rows[:, self._every]
         some = rows.reshape(3, len(self._body), self.count)[:, :, self._every]
@@ -60,7 +60,7 @@ class Drawn:
         return some.reshape(3, -1)
 
     def coloured(self, frame: Particles | State, scale: Scale, values: Values) -> tuple[Floats, Colours, Colours]:
-        """The points (3, N) of a frame, their colours, and those of the lines that are not edges of faces."""
+        """The points (3, N) of a frame, their colours, and the colours of lines that are not edges of faces."""
         position, velocity = self.points(frame.position), self.points(frame.velocity)
         lines = np.zeros(0, np.uint32)
         if len(self.lines) and not len(self.triangles):
@@ -74,16 +74,16 @@ class Drawn:
         return (points[self.lines], tints), (points[self.triangles], packed[self.triangles])
 
     def middles(self, rows: Floats) -> Floats:
-        """The middles of the lines, from the points that are shown."""
+        """The middles of the lines, from the shown points."""
         return np.asarray(0.5 * (rows[:, self.lines[:, 0]] + rows[:, self.lines[:, 1]]))
 
     def _of_all(self, groups: Pairs) -> NDArray[np.int64]:
-        """Groups of points of one body, of all that are shown; point p of the i-th is number p shown + i."""
+        """Groups of points of all shown bodies, from those of one; point p of body i has the number p shown + i."""
         return (groups[:, None] * self.shown + np.arange(self.shown)[:, None]).reshape(-1, groups.shape[1])
 
 
 def _lines(body: Body) -> Pairs:
-    """The bonds of a body, or the edges of its faces; where it is rigid, without those within a flat face."""
+    """The bonds of a body, or the edges of its faces, for a rigid body without those within a flat face."""
     if not len(body.faces):
         return np.unique(np.sort(body.bonds(), axis=1), axis=0)
     corners = (body.contacts @ body.points)[body.faces]

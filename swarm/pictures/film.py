@@ -1,4 +1,4 @@
-"""A trajectory as a film: particles among their walls, frame by frame, by the writers of matplotlib."""
+"""A trajectory as a film: particles among their walls, frame by frame, with the writers of matplotlib."""
 
 import bisect
 import contextlib
@@ -31,16 +31,16 @@ from .scenery import Scenery, red_green_blue
 from .triad import INK
 
 _SUFFIXES = (".mp4", ".gif")
-# Pixels of a side of the film.
+# The smallest and the largest side of a film [pixels].
 _LEAST, _MOST = 64, 8192
-# Pixels an inch, in which letters have the size of those of a plot; fewer where a side has less than these pixels: the
-# letters would leave no room for the axes.
+# Pixels an inch, which give letters the size of those of a plot; fewer if a side has fewer than the second number of
+# pixels: the letters would leave no room for the axes.
 _DPI, _ROOM = 120, 240
-# A GIF counts in hundredths of a second, and viewers take less than 2 for 10.
+# A GIF counts in hundredths of a second, and viewers replace 0 and 1 by 10.
 _FASTEST = 50.0
 
 
-# Matplotlib's writers draw every frame anew, twice; these take what `_Film` has drawn.
+# Matplotlib's writers draw every frame anew, twice; these use the canvas that `_Film` has drawn.
 
 
 class _Video(FFMpegWriter):
@@ -49,7 +49,7 @@ class _Video(FFMpegWriter):
 
 
 class _Gif(PillowWriter):
-    """Keeps frames in the colours of the first, a byte a pixel: four bytes would fill the memory."""
+    """Keeps frames in the palette of the first one, a byte a pixel: four bytes would fill the memory."""
 
     _frames: list[Any]
 
@@ -94,7 +94,7 @@ def animate(trajectory: Any, path: Any, frames: int, fps: float, size: Any, part
 
 
 def pixels_of(size: Any) -> tuple[int, int]:
-    """The width and the height of a film, both even, as videos have them."""
+    """Return the width and the height of a film, both even, as videos need them."""
     with contextlib.suppress(TypeError, ValueError):
         wide, high = size
         sides = checks.count("size", wide, _LEAST), checks.count("size", high, _LEAST)
@@ -104,7 +104,7 @@ def pixels_of(size: Any) -> tuple[int, int]:
 
 
 def _ffmpeg() -> str:
-    """The program that writes videos."""
+    """Return the path of the program that writes videos."""
     found = shutil.which("ffmpeg")
     if found is None:
         with contextlib.suppress(ImportError, RuntimeError):
@@ -126,7 +126,7 @@ def has_ffmpeg() -> bool:
 
 
 def _reason(error: Exception) -> str:
-    """The message of an error, of ffmpeg the last line that it has written."""
+    """The message of an error; for ffmpeg the last line of its output."""
     if isinstance(error, CalledProcessError):
         message = error.stderr.decode(errors="replace") if isinstance(error.stderr, bytes) else error.stderr
         ended = signal.strsignal(-error.returncode) if error.returncode < 0 else f"exit code {error.returncode}"
@@ -141,14 +141,14 @@ class _Film:
         self._trajectory, self._scene = trajectory, trajectory.scene
         self._seen, (start, last) = trajectory.observed(), (trajectory.frame(numbers[k]) for k in (0, -1))
         self._drawn = drawn = Drawn(len(start), trajectory.body, most, start.radius)
-        # Walls without an end are drawn around the particles of the first frame and of the last.
+        # Unbounded walls are drawn around the particles of the first frame and of the last.
         self._around = np.concatenate([framed.most_of(one.position) for one in (start, last)], axis=1)
         self._between = dict[tuple[int, float], list[Shape]]()
         self._noun = drawn.noun_of(drawn.count, self._scene.plane)
         self._changes = self._scene.moves() or self._scene.has_doors()
         self._shapes = shapes_of(self._scene, self._around)
         self._scale, self._values = colours.by_speed(self._scene, trajectory.method, start, last)
-        # Half a pixel is added so that round-off does not take a whole one away.
+        # Half a pixel is added so that round-off does not remove a pixel.
         dpi = _DPI * min(1.0, min(pixels) / _ROOM)
         self.picture = style.picture((pixels[0] + 0.5) / dpi, (pixels[1] + 0.5) / dpi)
         self.picture.set_dpi(dpi)
@@ -163,7 +163,7 @@ class _Film:
         if across is not None:
             at = drawn.points(start.position).T
             self._dots, self._walls = flat.flat(self._axes, across, at, INK, self._shapes, found, drawn.radius)
-            # Walls are before particles, and all that is still is drawn once, but for these.
+            # Walls are in front of particles; all artists that do not change are drawn once, except these.
             self._walls = [one for one in self._walls if self._changes or one.get_zorder() > self._dots.get_zorder()]
             changing = [*self._walls, self._dots]
         else:
@@ -180,7 +180,7 @@ class _Film:
         self._still = self._canvas.copy_from_bbox(self.picture.bbox)
 
     def _found(self, numbers: list[int]) -> list[Floats]:
-        """The points that the picture shows: the walls of all frames, and particles where these do not enclose them."""
+        """The points that the picture must contain: walls in all frames, and particles if no wall encloses them."""
         found = []
         for k in numbers if self._changes or framed.is_open(self._shapes) else numbers[:1]:
             points = self._drawn.points(self._trajectory.frame(k).position).T
@@ -188,9 +188,9 @@ class _Film:
         return found
 
     def _walls_at(self, k: int) -> list[Shape]:
-        """Every wall at frame k: those of the start, moved."""
+        """The walls at frame k: those of the start, moved."""
         if self._scene.has_doors() or any(shape.motion is not None for shape in self._shapes):
-            # Where doors shut, or parts of a union move, other walls are there.
+            # Where doors shut, or parts of a union move, the shapes of the walls change.
             return self._walls_then(float(self._seen["time"][k]))
         if not self._scene.moves():
             return self._shapes
@@ -199,7 +199,7 @@ class _Film:
         return [shape.moved(*since_start(self._scene, shape, moments, places)) for shape in self._shapes]
 
     def _walls_then(self, time: float) -> list[Shape]:
-        """The walls that are there at a time [s], made once from one instant to the next."""
+        """The present walls at a time [s], made once for each interval between instants."""
         which = bisect.bisect_right(self._scene.instants, time), time if self._scene.moves() else 0.0
         if which not in self._between:
             self._between[which] = shapes_of(self._scene, self._around, time)
@@ -225,7 +225,7 @@ class _Film:
             artist.remove()
 
     def _in_plane(self, k: int, position: Floats, packed: Any) -> tuple[list[Any], list[Any]]:
-        """The artists of a frame, and those of them that are its own."""
+        """The artists of a frame, and those among them that only this frame has."""
         dots, across = self._dots, self._across
         assert across is not None
         dots.set_offsets(shown_as(across, position.T))
@@ -240,7 +240,7 @@ class _Film:
         return [*walls, dots], walls if self._changes else []
 
     def _in_space(self, k: int, position: Floats, packed: Any, tints: Any) -> tuple[list[Any], list[Any]]:
-        """The artists of a frame, and those of them that are its own."""
+        """The artists of a frame, and those among them that only this frame has."""
         scenery = self._scenery
         assert scenery is not None
         walls = list[Any]()

@@ -17,9 +17,9 @@ from .style import CAVITY, CAVITY_LINE, SOLID, SOLID_LINE
 from .triad import INK, say_beyond
 
 _FEW_WIRES = 300
-# Around a vessel, as a part of its width.
+# The margin around a vessel, as a part of its width.
 _ROOM = 0.02
-# Ends of curves so near to each other, as a part of the width of all, are one point.
+# Ends of curves at a smaller distance, as a part of the total width, are one point.
 _SAME = 2e-3
 # An opening is at most this part of the length of the wall around it.
 _OPEN = 0.34
@@ -28,11 +28,11 @@ _TICKS = 5
 
 
 def ends_in_plane(across: int, found: list[Floats]) -> tuple[Floats, Floats]:
-    """The lower left and the upper right corner of what is seen of points, with room in directions without any."""
+    """The lower left and the upper right corner of points in the plane, with room in directions without extent."""
     seen = np.concatenate([shown_as(across, one) for one in found])
     low, high = seen.min(axis=0), seen.max(axis=0)
     wide, far = float((high - low).max()), float(np.abs(seen).max())
-    # All at one point: the room is as large as its distance from the origin, so that round-off does not take it.
+    # If all points coincide, the room is their distance from the origin, so that round-off does not remove it.
     room = wide if wide > 1e-9 * far else far or 1.0
     none = np.where(high - low <= 1e-9 * room, 0.5 * room, 0.0)
     return low - none, high + none
@@ -42,9 +42,9 @@ def flat(
     axes: Any, across: int, points: Floats, colour: Any, shapes: list[Shape],
     found: list[Floats] | None = None, radius: Floats | None = None,
 ) -> tuple[Any, list[Any]]:  # fmt: skip
-    """Particles (N, 3), or discs of a `radius`, and walls, in axes of their plane around the points that are `found`.
+    """Draw particles (N, 3), or discs of a `radius`, and walls, in axes of their plane around the points `found`.
 
-    Returns the artists of the particles, and those of the walls.
+    Return the artists of the particles, and those of the walls.
     """
     if found is None:
         some = [np.concatenate(shape.edges) for shape in shapes if shape.edges]
@@ -77,7 +77,7 @@ def flat(
 
 
 def draw_walls(axes: Any, across: int, shapes: list[Shape], wide: float) -> list[Any]:
-    """Walls as lines; what is within closed ones is light, what is within solids filled. Returns the artists."""
+    """Draw walls as lines, the inside of closed ones light and solids filled; return the artists."""
     drawn: list[Any] = []
     lines = {
         solid: [shown_as(across, c) for s in shapes if s.solid == solid for c in s.edges] for solid in (False, True)
@@ -100,9 +100,9 @@ def draw_walls(axes: Any, across: int, shapes: list[Shape], wide: float) -> list
 
 
 def _loops(lines: list[Floats], same: float, opened: float) -> list[Floats]:
-    """The closed curves of lines with ends so near to each other [m], or with the ends of an opening.
+    """The closed curves of lines with ends at most `same` apart [m], or with the ends of an opening.
 
-    An opening is at most this part of the length of what it joins.
+    An opening is at most the part `opened` of the length of the lines that it joins.
     """
     chains = [line for line in lines if len(line) > 1]
     found = [line for line in chains if len(line) > 2 and _apart(line[0], line[-1]) <= same]
@@ -138,7 +138,7 @@ def _chained(others: list[Floats], same: float) -> list[Floats]:
 
 
 def _across_openings(chains: list[Floats], opened: float) -> list[Floats]:
-    """Chains joined from end to end, the nearest ends first, where an opening is short beside them."""
+    """Join chains from end to end, the nearest ends first, where an opening is short relative to them."""
     ready, chains = list[Floats](), list(chains)
     while chains and len(chains) <= _FEW_WIRES:
         ends = np.array([(one[0], one[-1]) for one in chains]).reshape(-1, 2)

@@ -16,28 +16,28 @@ from .style import GREY, ink
 Curves = dict[str, tuple[Floats, Floats]]
 End = tuple[float, str, str]
 
-# Units of what particles exert, and below which so few of molecular mass do that no gauge would show it.
+# Units of pressures and forces; below the last value those of molecules are so small that no gauge would show them.
 _PRESSES, _MOLECULAR = ("Pa", "N/m", "N"), 1e-12
-# Most curves with a colour each; of more these energies have one.
+# The largest number of curves with colours of their own; of more energies only these have one.
 _ENERGIES = (*series.ENERGIES, "brought by")
 _MOST = 6
-# Above round-off values that span so much are on a logarithmic axis.
+# Values above round-off with a larger ratio than this are on a logarithmic axis.
 _DECADES = 1e3
-# The least distance between labels of curves, in heights of the axes.
+# The smallest distance between labels of curves, in heights of the axes.
 _APART = 0.085
-# The width of a plot [inches], at least.
+# The smallest width of a plot [inches].
 _CELL = 2.5
 
 
 def rows_of(count: int, width: float) -> list[int]:
-    """How many plots are in each row, as even as may be, the longer rows last: they fill the width."""
+    """The number of plots in each row, as even as possible, the longer rows last: they fill the width."""
     columns = max(1, min(round(width / _CELL), -(-count // 2)))
     rows = max(1, -(-count // columns))
     return [count // rows + (k >= rows - count % rows) for k in range(rows)]
 
 
 def cells_of(figure: Any, rows: list[int]) -> list[Any]:
-    """Axes of so many plots in each row of a figure."""
+    """Create axes for these numbers of plots in the rows of a figure."""
     parts = figure.subfigures(len(rows), 1, squeeze=False).ravel()
     return [
         one
@@ -48,20 +48,20 @@ def cells_of(figure: Any, rows: list[int]) -> list[Any]:
 
 
 def lines(axes: Any, graph: series.Graph, drawn: Curves, limit: float | None = ROUND_OFF) -> None:
-    """Draw the time series of one graph, by their names: (times [s], values). Rates have no value at the first frame.
+    """Draw the time series of one graph, (times [s], values) by name. Rates have no value at the first frame.
 
     Args:
-        axes: what they are drawn in.
-        graph: what they show.
+        axes: the axes to draw in.
+        graph: the description of the graph.
         drawn: the curves.
-        limit: of errors what round-off explains; None: nothing is round-off.
+        limit: for errors, the largest one that round-off explains; None: no error is round-off.
     """
     axes.set_title(_titled(graph, drawn))
     if not any(len(times) for times, _values in drawn.values()):
         _words(axes, "needs two frames")
         return
     if graph.is_error:
-        # From their logarithms.
+        # The curves of errors are logarithms.
         drawn = {
             name: (times, np.where(values <= series.NOTHING, 0.0, 10.0**values))
             for name, (times, values) in drawn.items()
@@ -92,14 +92,14 @@ def lines(axes: Any, graph: series.Graph, drawn: Curves, limit: float | None = R
 
 
 def _labelled(graph: series.Graph, written: str, size: float) -> str:
-    """The label of an axis with its unit. Of molecules: the pressure is of those that are run, and a gas has more."""
+    """The label of an axis with its unit. The pressure of molecules is that of the simulated ones; a gas has more."""
     label = f"{graph.label or graph.quantity} [{written}]" if written else graph.label or graph.quantity
     is_molecular = graph.unit in _PRESSES and 0.0 < size < _MOLECULAR
     return f"{label}\nof the simulated particles" if is_molecular else label
 
 
 def _merged(drawn: Curves) -> Curves:
-    """The curves of energies without those that are round-off of the total, and that once where all is kinetic."""
+    """Energies without curves that are round-off of the total, and only the total if all energy is kinetic."""
     if "total" not in drawn or not len(drawn["total"][1]):
         return drawn
     total = drawn["total"][1]
@@ -113,7 +113,7 @@ def _merged(drawn: Curves) -> Curves:
 
 
 def _titled(graph: series.Graph, drawn: Curves) -> str:
-    """The title of a graph: of one surface with its name."""
+    """The title of a graph; that of one surface has its name."""
     title = graph.title
     (first, *others) = drawn
     if not others and first == "virial":
@@ -126,7 +126,7 @@ def _titled(graph: series.Graph, drawn: Curves) -> str:
 
 
 def _words(axes: Any, text: str) -> None:
-    """A plot of nothing but words."""
+    """Write words in place of a plot."""
     axes.text(0.5, 0.5, text, ha="center", va="center", color=GREY, transform=axes.transAxes)
     axes.set_axis_off()
 
@@ -135,10 +135,10 @@ def _words(axes: Any, text: str) -> None:
 
 
 def _curves(axes: Any, drawn: Curves, steps: bool) -> list[End]:
-    """Draw the curves, and return their names with their ends and colours: of many their mean, and all in grey."""
+    """Draw the curves, return their names, ends and colours; of too many draw all in grey and label their mean."""
     named = [name for name in drawn if name.startswith(_ENERGIES)]
     if len(drawn) - len(named) <= _MOST:
-        # The curves of more than `_MOST` walls are grey, with their mean: a single one says little.
+        # The curves of more than `_MOST` walls are grey, with their mean: a single one tells little.
         named = list(drawn)
     ends: list[End] = []
     for name, (times, values) in drawn.items():
@@ -164,13 +164,13 @@ def _curves(axes: Any, drawn: Curves, steps: bool) -> list[End]:
 
 
 def _stepped(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """A rate from the frame before its first one on."""
+    """The values of a rate with a first step that begins one frame earlier."""
     before = max(0.0, 2.0 * times[0] - times[1]) if len(times) > 1 else 0.0
     return np.concatenate([[before], times]), np.concatenate([values[:1], values])
 
 
 def _label(axes: Any, found: list[End]) -> None:
-    """The names of curves beside their ends, apart from one another."""
+    """Write the names of curves beside their ends, apart from one another."""
     low, high = axes.get_ylim()
     if axes.get_yscale() == "log":
         low, high = np.log10(low), np.log10(high)
@@ -180,7 +180,7 @@ def _label(axes: Any, found: list[End]) -> None:
         place = (np.log10(max(value, 10.0**low)) if axes.get_yscale() == "log" else value) - low
         last = max(min(1.0, max(0.0, place / (high - low))), last + _APART)
         heights.append(last)
-    # What would stand above the axes pushes the others down.
+    # A label above the axes pushes the others down.
     top = 1.0
     for k in range(len(heights) - 1, -1, -1):
         heights[k] = min(heights[k], top)
@@ -193,7 +193,7 @@ def _label(axes: Any, found: list[End]) -> None:
 
 
 def _heights(axes: Any, drawn: Curves) -> None:
-    """A linear axis from 0, or over all values and 0, so that what is constant is seen to be, and to be how large."""
+    """Set a linear axis that includes 0 and all values, so that a constant is seen as constant and with its size."""
     values = np.concatenate([values for _times, values in drawn.values()])
     low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
     room = 0.06 * ((high - low) or 1.0)
@@ -205,7 +205,7 @@ def _heights(axes: Any, drawn: Curves) -> None:
 
 
 def _tick(largest: float, value: float, _place: Any = None) -> str:
-    """A number at an axis, by the largest one there: 10 000, 250 k, 1.2 M."""
+    """Format a number at an axis, by the largest one there: 10 000, 250 k, 1.2 M."""
     if largest < 1e5:
         return many(value) if value == int(value) else plain(value)
     factor, unit = prefixed(largest, "~")
@@ -213,7 +213,7 @@ def _tick(largest: float, value: float, _place: Any = None) -> str:
 
 
 def _errors(axes: Any, drawn: Curves, limit: float | None, unit: str) -> None:
-    """The axis of errors: linear with the band of round-off, or logarithmic where they span decades above it."""
+    """Set the axis of errors: linear with the band of round-off, or logarithmic if they span decades above it."""
     values = np.concatenate([values for _times, values in drawn.values()])
     worst, least = float(values.max()), float(values[values > 0.0].min())
     summary = f"at most {plain(worst, 2)} {unit}".strip()

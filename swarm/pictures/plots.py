@@ -1,4 +1,4 @@
-"""A run in one picture: time series that show whether it went well, speeds, and the particles."""
+"""A run in one picture: time series that show its quality, speeds, and the particles."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,15 +22,15 @@ from . import colours, drawing, graphs, sentences, series, speeds, style
 from .drawn import Drawn
 from .framed import most_of
 
-# Most particles drawn, or points of bodies.
+# The largest number of drawn particles, or points of bodies.
 SHOWN = 5000
 # [inches]: the width of a picture, and the height of one time series.
 _WIDE, _HIGH = 12.5, 2.35
-# Which part of a picture the time series have beside the particles; and its least height [inches].
+# The part of a picture's width for time series beside the particles; and its smallest height [inches].
 _SERIES, _LEAST = 0.66, 6.4
-# The least part of the width that particles have, and the part of the height that a vessel has of its panel.
+# The smallest part of the width for particles, and the part of its panel's height that a vessel fills.
 _FEWEST, _TALL = 0.24, 0.8
-# What a vessel has above and below it [inches]: a title, a triad and a colour bar, or axes and a colour bar.
+# The height above and below a vessel [inches]: for a title, a triad and a colour bar, or axes and a colour bar.
 _AROUND, _AROUND_PLANE = 1.8, 1.8
 
 
@@ -47,7 +47,7 @@ def draw_plot(trajectory: Any, target: Path) -> None:
 
 
 def figure_of(content: Content, figsize: Any, particles: int) -> style.Picture:
-    """The picture, in which at most so many particles are drawn; as high as its plots need where no size is given."""
+    """The picture with at most `particles` particles; without a size, its plots determine the height."""
     most = checks.count("particles", particles)
     try:
         wide, high = (_WIDE, 0.0) if figsize is None else (checks.positive("figsize", side) for side in figsize)
@@ -71,7 +71,7 @@ def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.
     picture = style.picture(wide, high)
     right: Any = picture
     if end is not None:
-        # As wide as the vessel fills the height, as far as the series have room.
+        # The width is chosen so that the vessel fills the height, as far as the series leave room.
         aspect = drawing.aspect(shapes, end.position.T, scene.across())
         part = 1.0 - min(max(aspect * _TALL * high / wide, _FEWEST), 1.0 - _SERIES)
         left, right = picture.subfigures(1, 2, width_ratios=[1.0 - part, part], squeeze=False).ravel()
@@ -87,14 +87,14 @@ def _figure_of(content: Content, size: tuple[float, float], most: int) -> style.
 
 
 def walls_of(content: Content, k: int) -> list[Shape]:
-    """The walls as they are at frame k, around most of the particles that are known last."""
+    """The walls at frame k, around most of the particles of the last known frame."""
     seen, frame = content.seen, content.frames.get("end", content.frames.get("start"))
     around = np.zeros((3, 1)) if frame is None else most_of(frame.position)
     return shapes_of(content.scene.at_frame(seen, k), around, float(seen["time"][k]))
 
 
 def _shown(content: Content, shapes: list[Shape]) -> dict[str, graphs.Curves]:
-    """The curves of each plot that says something."""
+    """The curves of each plot that is informative."""
     times, seen = content.seen["time"], _with_inside(content)
     drawn = {}
     for line in series.lines_of(content.scene, content.method, shapes, content.body, seen):
@@ -105,7 +105,7 @@ def _shown(content: Content, shapes: list[Shape]) -> dict[str, graphs.Curves]:
 
 
 def _series(cells: list[Any], content: Content, plots: dict[str, graphs.Curves], last: int) -> None:
-    """The time series; the `last` of them say what the axes of times are."""
+    """Draw the time series; the `last` of them label the axes of times."""
     soft = content.method.law() is not None and not content.method.has_multipliers()
     limits = {"penetration": None if soft else verdicts.penetration_limit(content), "overlap": None}
     errors = verdicts.energy_limit(content)
@@ -117,7 +117,7 @@ def _series(cells: list[Any], content: Content, plots: dict[str, graphs.Curves],
 
 
 def _with_inside(content: Content) -> dict[str, NDArray[Any]]:
-    """The observables, with how many are inside where any come or go."""
+    """The observables, and the number of particles inside if particles come or go."""
     seen = dict(content.seen)
     gone = np.asarray(seen["escaped"]) + np.sum(seen.get("absorbed", np.zeros((len(seen["time"]), 1))), axis=1)
     comes_or_goes = bool(np.any(gone)) or "born" in seen
@@ -139,7 +139,7 @@ def _middle(figure: Any, aspect: float, across: int | None) -> Any:
 
 
 def _places(figure: Any, content: Content, name: str, shapes: list[Shape], most: int) -> None:
-    """The particles, or the bodies, of a frame: those that are there."""
+    """Draw the present particles, or bodies, of a frame."""
     end = content.inside(name)
     drawn = Drawn(len(end), content.body, most, end.radius)
     start = content.frames.get("start", content.frames[name])
@@ -172,11 +172,11 @@ def _places(figure: Any, content: Content, name: str, shapes: list[Shape], most:
     figure.suptitle(title, fontsize=10)
 
 
-# --- Of one thing each, for pages ------------------------------------------------------------------------
+# --- Single graphs, for pages -----------------------------------------------------------------------------
 
 
 def graphs_of(content: Content) -> list[tuple[str, Callable[[Any], None]]]:
-    """The graphs that say something: what each shows, and the function that draws it in axes."""
+    """The informative graphs: the title of each, and the function that draws it in axes."""
     shown: list[tuple[str, Callable[[Any], None]]] = []
     for group, curves in _shown(content, walls_of(content, -1)).items():
         title = series.GRAPHS[group].across(content.scene.plane).name

@@ -1,4 +1,4 @@
-"""What is opaque in a picture, pixel by pixel, with its depth: triangles and balls, nearer ones before others."""
+"""The opaque part of a picture, pixel by pixel, with its depth: triangles and balls, nearer ones before others."""
 
 import itertools
 from typing import Any
@@ -12,19 +12,19 @@ from .eye import Eye
 
 # The light comes from above on the left, from behind the eye: to the right, up, and towards the eye.
 LIGHT = np.array([-0.42, 0.58, 0.70])
-# Of a shaded colour, the part in the shadow, and where it shines, the power of it and how white.
+# Shading: the part of a colour in the shadow; the exponent of the highlight and its whiteness.
 _SHADOW, _SHINE, _WHITE = 0.45, 24.0, 0.45
-# Pixels that are painted at once.
+# The largest number of pixels that are painted at once.
 _MOST = 3_000_000
-# The least radius of a ball [pixels].
+# The smallest radius of a ball [pixels].
 _LEAST = 0.6
 
 
 class Raster:
-    """Pixels of a window of what an eye sees: lower left and upper right corner [m], and pixels a metre.
+    """Pixels of a window in an eye's coordinates: lower left and upper right corner [m], and pixels a metre.
 
     Attributes:
-        depth: (rows, columns), the lowest row first: how far towards the eye what is there is [m], or -inf.
+        depth: (rows, columns), the lowest row first: the distance of each pixel's surface towards the eye [m], or -inf.
         colour: (rows, columns, 3), from 0 to 1.
     """
 
@@ -35,7 +35,7 @@ class Raster:
         self.colour = np.ones((tall, wide, 3), np.float32)
 
     def copy(self) -> "Raster":
-        """One with the same pixels, to paint more."""
+        """Return a raster with the same pixels, to paint more on it."""
         other = object.__new__(Raster)
         other.low, other.scale = self.low, self.scale
         other.depth, other.colour = self.depth.copy(), self.colour.copy()
@@ -53,7 +53,7 @@ class Raster:
         return np.concatenate([self.colour, np.isfinite(self.depth)[..., None]], axis=2, dtype=np.float32)
 
     def hides(self, seen: Floats, within: float = 0.0) -> NDArray[np.bool_]:
-        """Whether points (..., 3), as they are seen, are behind what is opaque by more than so much [m]."""
+        """Whether points (..., 3), in coordinates of the eye, are behind an opaque pixel by more than `within` [m]."""
         with np.errstate(invalid="ignore"):
             places = np.floor((seen[..., :2] - self.low) * self.scale)
             rows, columns = self.depth.shape
@@ -66,8 +66,8 @@ class Raster:
     # --- Painting ----------------------------------------------------------------------------------------
 
     def triangles(self, seen: Floats, triangles: Indices, colour: Floats) -> None:
-        """Paint triangles with corners (V, 3), as they are seen, in colours of the corners (V, 3)."""
-        # Bodies that are not yet born have no place.
+        """Paint triangles with corners (V, 3), in coordinates of the eye, and colours of the corners (V, 3)."""
+        # Bodies before their birth have no position.
         triangles = triangles[np.isfinite(seen[triangles]).all(axis=(1, 2))]
         corners = seen[triangles]
         xy = (corners[..., :2] - self.low) * self.scale - 0.5
@@ -111,7 +111,7 @@ class Raster:
         self.colour.reshape(-1, 3)[place[won]] = tints
 
     def balls(self, seen: Floats, radius: Floats, colour: Floats) -> None:
-        """Paint shaded balls at points (n, 3), as they are seen, of a radius (n,) [m] and colours (n, 3)."""
+        """Paint shaded balls at points (n, 3), in coordinates of the eye, of a radius (n,) [m] and colours (n, 3)."""
         rows, columns = self.depth.shape
         middle, r = (seen[:, :2] - self.low) * self.scale - 0.5, np.maximum(radius * self.scale, _LEAST)
         ends = [(middle[:, k] - r, middle[:, k] + r) for k in (0, 1)]
@@ -133,14 +133,14 @@ class Raster:
             self.colour.reshape(-1, 3)[place[won]] = lit(colour[which[won]], normals)
 
     def _win(self, place: Indices, depth: Floats) -> Indices:
-        """Which of these are nearest at their pixels."""
+        """Paint depths; return the indices of those that are nearest at their pixels."""
         flat = self.depth.reshape(-1)
         np.maximum.at(flat, place, depth)
         return np.flatnonzero(depth == flat[place])
 
 
 def lit(colour: Floats, normals: Floats) -> Floats:
-    """Colours (n, 3) of what has normals (n, 3), as they are seen, in the light."""
+    """Light the colours (n, 3) of surfaces with normals (n, 3), in coordinates of the eye."""
     bright = (normals @ (LIGHT / np.sqrt(LIGHT @ LIGHT))).clip(0.0)
     half = LIGHT / np.sqrt(LIGHT @ LIGHT) + (0.0, 0.0, 1.0)
     shine = _WHITE * (normals @ (half / np.sqrt(half @ half))).clip(0.0) ** _SHINE
@@ -149,7 +149,7 @@ def lit(colour: Floats, normals: Floats) -> Floats:
 
 
 def corners_of(eye: Eye, faces: Floats, colour: Floats) -> tuple[Floats, Indices, Floats]:
-    """Faces (T, 3, 3) of colours (T, 3) as `Raster.triangles` takes them, each with the light on it."""
+    """The arguments of `Raster.triangles` for lit faces (T, 3, 3) of colours (T, 3)."""
     seen = eye.seen(faces)
     normal = normalized(np.cross(seen[:, 1] - seen[:, 0], seen[:, 2] - seen[:, 0]), 1)
     normal *= np.where(normal[:, 2:] < 0.0, -1.0, 1.0)
@@ -166,7 +166,7 @@ def _spread(first: Any, last: Any) -> tuple[Indices, Indices]:
 
 
 def _runs(part: Indices) -> list[tuple[int, int]]:
-    """Where equal numbers, which ascend, begin and end."""
+    """The begin and end of each run of equal numbers, which ascend."""
     if not len(part):
         return []
     cuts = [0, *(np.flatnonzero(np.diff(part)) + 1).tolist(), len(part)]

@@ -1,7 +1,7 @@
-"""The picture of walls in which particles are placed.
+"""The picture of walls among which particles are placed.
 
-From the back to the front: the far inner sides of cavities and what is seen on them, solids and all that is opaque,
-particles, and what is near of the edges.
+From the back to the front: the far inner sides of cavities and lines on them, solids and all opaque parts,
+particles, and the near edges.
 """
 
 from typing import Any
@@ -22,15 +22,15 @@ from .raster import Raster, corners_of, lit
 from .style import CAVITY_LINE, SOLID, SOLID_LINE, backdrop
 from .triad import BAR, STRIP, draw_triad, say_beyond
 
-# Around a vessel, as a part of its width or height; pixels of a raster for each of the picture, and the most.
+# The margin around a vessel, as a part of its width or height; pixels of a raster for each of the picture, and at most.
 _ROOM, _FINE, _MOST = 0.025, 1.5, 1600.0
-# What is on a wall is behind its pixels by less than this part of the picture.
+# A line on a wall is behind the pixels of that wall by less than this part of the picture.
 _ON = 0.006
-# The part of its colour that a cavity has where it faces the eye, and where it turns away.
+# The opacity of a cavity's colour where it faces the eye, and where it turns away.
 _CLEAR, _TINTED = 0.30, 0.95
 Ties = tuple[Floats, Colours]
 NO_TIES: Ties = np.empty((0, 0, 3)), np.empty(0, np.uint32)
-# Triangles that are nearly parallel to the way to the eye turn away from it by round-off only.
+# Triangles nearly parallel to the direction of the eye turn away from it by round-off only.
 _ROUND_OFF = 1e-9
 
 
@@ -40,7 +40,7 @@ def red_green_blue(packed: Colours) -> Floats:
 
 
 class Scenery:
-    """The picture of walls in axes, in which particles are placed; what it draws is in `still`, `solid` and `front`."""
+    """The picture of walls in axes, with particles among them; its artists are in `still`, `solid` and `front`."""
 
     def __init__(self, axes: Any, shapes: list[Shape], found: list[Floats]) -> None:
         self.axes, self.shapes = axes, shapes
@@ -53,7 +53,7 @@ class Scenery:
         rows, columns = (1, 1) if spec is None else spec.get_gridspec().get_geometry()
         pixels = np.array([box.width / columns, box.height / rows])
         strip = STRIP * dpi / 72.0
-        # Below the vessel, or beside it where it leaves room there
+        # Below the vessel, or beside it if there is room.
         wide, tall = high - low
         beside = wide * pixels[1] / tall + 3.0 * strip < pixels[0]
         rest = pixels - ((3.0 * strip, 0.0) if beside else (0.0, min(strip, 0.5 * pixels[1])))
@@ -101,7 +101,7 @@ class Scenery:
                     self._lines(seen, SOLID_LINE, wide, alpha, 1.6, self.still)
 
     def _sorted(self) -> tuple[list[tuple[list[Floats], str, float, float]], list[Floats]]:
-        """The lines of cavities that are behind particles, and those that are before them."""
+        """The lines of cavities behind particles, and those in front of them."""
         far, near = [], list[Floats]()
         for shape in self.shapes:
             if shape.solid:
@@ -116,7 +116,7 @@ class Scenery:
         return far, near
 
     def _split(self, curves: list[Floats]) -> tuple[list[Floats], list[Floats]]:
-        """The parts of curves that are before the far side, and those on it."""
+        """The parts of curves in front of the far side, and those on it."""
         before, behind = list[Floats](), list[Floats]()
         for curve in curves:
             seen = self._fine(curve)
@@ -127,27 +127,27 @@ class Scenery:
         return before, behind
 
     def _covered(self, seen: Floats) -> NDArray[np.bool_]:
-        """Whether there is a far side at points as they are seen."""
+        """Whether there is a far side at points in coordinates of the eye."""
         far = seen.copy()
         far[:, 2] = -np.finfo(np.float64).max
         return self._back.hides(far)
 
     def _cut(self, curves: list[Floats]) -> list[Floats]:
-        """The parts of curves, as they are seen, that nothing opaque hides."""
+        """The parts of curves, in coordinates of the eye, that no opaque pixel hides."""
         return [run for seen in curves for run in runs(seen, ~self.opaque.hides(seen, self._on))]
 
     def _fine(self, curve: Floats) -> Floats:
-        """A curve as it is seen, with points so near to each other that it can be cut."""
+        """A curve in coordinates of the eye, with points close enough for cuts."""
         return finer(self.eye.seen(curve), float((self.high - self.low).max()) / 250.0)
 
     def clear(self) -> None:
-        """Take away what has been drawn of walls."""
+        """Remove the artists of walls."""
         for artist in (*self.still, *self.front):
             artist.remove()
         self.still, self.front = [], []
 
     def near_lines(self) -> None:
-        """Draw what is before the particles: the near edges of cavities."""
+        """Draw the near edges of cavities, which are in front of the particles."""
         self._lines(self._cut(self._near_curves), CAVITY_LINE, 0.8, 0.7, 4.0, self.front)
 
     def _lines(self, curves: list[Floats], colour: Any, wide: float, alpha: float, order: float, to: list[Any]) -> None:
@@ -172,7 +172,7 @@ class Scenery:
         self, points: Floats, packed: Colours, lines: Ties = NO_TIES, faces: Ties = NO_TIES,
         radius: Floats | None = None,
     ) -> list[Any]:  # fmt: skip
-        """Draw particles or bodies; returns their artists."""
+        """Draw particles or bodies; return their artists."""
         there = (packed & 0xFF > 0) & ~np.isnan(points[:, 0])
         seen, colour = self.eye.seen(points[there]), red_green_blue(packed[there])
         drawn: list[Any] = []
@@ -195,14 +195,14 @@ class Scenery:
         return drawn
 
     def dots(self, seen: Floats, colour: Floats, count: int) -> Any:
-        """Dots of those that no solid hides, the nearer ones before others."""
+        """Draw dots for particles that no solid hides, the nearer ones before others."""
         kept = np.flatnonzero(~self.opaque.hides(seen))
         kept = kept[np.argsort(seen[kept, 2])]
         tints, size = colours_of(colour[kept], len(kept)), size_of_dots(count)
         return self.axes.scatter(*seen[kept, :2].T, c=tints, s=size, linewidths=0.0, zorder=2.0)
 
     def _bonds(self, lines: Floats, packed: Colours) -> list[Any]:
-        """The lines of bodies, wider the fewer there are."""
+        """Draw the lines of bodies, wider for fewer lines."""
         if not len(lines):
             return []
         seen = self.eye.seen(lines)
@@ -217,7 +217,7 @@ class Scenery:
 
 
 def _solid(normals: Floats) -> Floats:
-    """The colours of a solid with normals (n, 3), as they are seen."""
+    """The colours of a solid with normals (n, 3) in coordinates of the eye."""
     return 0.15 + 0.85 * lit(np.broadcast_to(to_rgb(SOLID), normals.shape), normals)
 
 
@@ -230,7 +230,7 @@ def _glass(normals: Floats) -> Floats:
 
 
 def silhouette(shape: Shape, eye: Eye) -> list[Floats]:
-    """The curves (k, 3) [m] at which normals turn away from the eye; of facets the sides at which one of two does."""
+    """The curves (k, 3) [m] at which normals turn away from the eye, and the edges between facets at which they do."""
     if not len(shape.triangles):
         return []
     towards = shape.normals @ eye.near
@@ -239,7 +239,7 @@ def silhouette(shape: Shape, eye: Eye) -> list[Floats]:
 
 
 def _of_facets(shape: Shape, towards: Floats) -> list[Floats]:
-    """The sides between a facet that faces the eye and one that does not, where these have corners of their own."""
+    """The edges between a facet that faces the eye and one that does not, if facets have corners of their own."""
     corners = towards[shape.triangles]
     if (np.ptp(corners, axis=1) > 1e-12).any():
         return []  # smooth walls: their creases are edges

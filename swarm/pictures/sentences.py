@@ -10,7 +10,7 @@ _LINE, _LETTERS = 0.17, 14.0
 
 
 def in_lines(texts: list[str], width: float) -> list[str]:
-    """Sentences wrapped to this width [inches]: a text with line breaks for each."""
+    """Wrap sentences to this width [inches]; return a text with line breaks for each."""
     letters = max(30, round(width * _LETTERS))
     return [textwrap.fill(text, letters, subsequent_indent="    ") for text in texts]
 
@@ -21,7 +21,7 @@ def height_of_lines(lines: list[str]) -> float:
 
 
 def write_below(figure: Any, lines: list[str], high: float) -> None:
-    """Write texts one below the other into a figure of this height [inches]; a verdict that fails (✗) is red."""
+    """Write texts one below the other into a figure of this height [inches]; a failed verdict (✗) is red."""
     line = 0.3
     for text in lines:
         figure.text(0.02, 1.0 - line * _LINE / high, text, va="top", fontsize=8.5,

@@ -1,4 +1,4 @@
-"""The time series that recordings and plots show, from the observables of frames."""
+"""The time series in recordings and plots, from the observables of frames."""
 
 import re
 from collections.abc import Collection, Mapping
@@ -16,22 +16,22 @@ from ..triangles.shape import Shape
 from ..words.named import name_of
 from ..words.nouns import labels
 
-# Stands for the logarithm of zero.
+# The value for the logarithm of zero.
 NOTHING = -18.0
 
 
 @dataclass(frozen=True)
 class Graph:
-    """A graph of time series: what it shows, and how.
+    """A graph of time series: its quantity, and its form.
 
     Attributes:
-        quantity: its name.
-        unit: of its values; "" of numbers and relative errors.
-        title: of the graph.
-        label: of its axis, below a title that says the rest; None: the quantity.
+        quantity: the name of its quantity.
+        unit: the unit of its values; "" for numbers and relative errors.
+        title: its title.
+        label: the label of its axis, if the title says the rest; None: the quantity.
         is_error: the values are log10 of errors, `NOTHING` where the error is 0.
         is_rare: pictures leave it out where all values are 0.
-        is_rate: the values are growths in a second, one for the time from frame to frame.
+        is_rate: the values are increases per second, one for the time from frame to frame.
     """
 
     quantity: str
@@ -48,11 +48,11 @@ class Graph:
         return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
 
     def across(self, plane: str | None) -> "Graph":
-        """The graph of a scene of two dimensions, in which pressures are per length."""
+        """The graph for a scene of two dimensions, in which pressures are forces per length."""
         return self if plane is None or self.unit != "Pa" else replace(self, unit="N/m")
 
 
-# By the first part of the entities that a graph shows.
+# The graphs by the first part of their entities' paths.
 GRAPHS = {
     "energy": Graph("energy", "J", "energy of all"),
     "energy_error": Graph(
@@ -82,13 +82,13 @@ class Line:
     """A time series of one number of an observable.
 
     Attributes:
-        path: its entity.
-        name: in the legend.
+        path: the path of its entity.
+        name: its name in the legend.
         observable: the name of the observable.
-        surface: the surface, of an observable with a number for each. Other rows of numbers are added up.
+        surface: the surface, for an observable with a number for each. Other rows of numbers are added up.
         logarithm: whether the logarithm is shown.
-        per: of a rate, the growth in a second since the frame before: what it is divided by.
-        along: the direction in which a vector is shown.
+        per: for a rate, the divisor of the increase per second since the last frame.
+        along: for a vector, the direction of the component that is shown.
     """
 
     path: str
@@ -100,7 +100,7 @@ class Line:
     along: tuple[float, ...] | None = None
 
     def values(self, times: Floats, seen: dict[str, Any]) -> Floats:
-        """The values at frames with these times [s] and observables; NaN at the first where they are rates."""
+        """The values at frames with these times [s] and observables; rates have NaN at the first frame."""
         # Files of older versions have no "sliding", and runs of particles no "work".
         column = np.asarray(seen.get(self.observable, np.zeros(len(times))), np.float64)
         if self.surface is not None:
@@ -124,8 +124,8 @@ def lines_of(
 ) -> list[Line]:
     """The time series of a scene with particles or bodies, without those that are always zero in it.
 
-    `more` has the observables that only some runs have: of sources "source_energy", of balls "collisions", of those
-    that turn "rotational_energy", and of soft ones "largest_overlap".
+    `more` has the observables that only some runs have: with sources "source_energy", with balls "collisions", with
+    rotating balls "rotational_energy", and with soft ones "largest_overlap".
     """
     named, one = scene.names_laws(), "particle" if body is None else "body"
     laws = None if named else scene.compiled().laws
@@ -164,7 +164,7 @@ def lines_of(
 def _lines_of_numbers(seen: Mapping[str, Any]) -> list[Line]:
     """The lines of numbers, from the observables of a run.
 
-    They show how many particles are inside, came, escaped or were absorbed, and the crossings of counters.
+    They show the numbers of particles that are inside, came, escaped or were absorbed, and the crossings of counters.
     """
     lines = []
     if "inside" in seen:
@@ -182,7 +182,7 @@ def _lines_of_numbers(seen: Mapping[str, Any]) -> list[Line]:
 
 
 def _lines_of_moved(scene: Scene) -> list[Line]:
-    """Where impacts have moved surfaces to: along their guides, or along each axis."""
+    """The displacements of surfaces by impacts: along their guides, or along each axis."""
     lines, names = [], labels(scene)
     for i, surface in enumerate(scene.surfaces):
         if surface.reacts() and surface.mass is not None:
@@ -195,12 +195,12 @@ def _lines_of_moved(scene: Scene) -> list[Line]:
 
 
 def _pairs_lose(scene: Scene) -> bool:
-    """Whether particles lose energy where they meet."""
+    """Whether particles lose energy in collisions."""
     return scene.pairs is not None and (scene.pairs.restitution < 1.0 or scene.pairs.friction > 0.0)
 
 
 def _lines_of_walls(scene: Scene, shapes: list[Shape]) -> list[Line]:
-    """What surfaces, or the parts of those that have parts, take and give: impulse, heat, work."""
+    """The lines of surfaces or, if a surface has parts, of its parts: impulse, heat, work."""
     lines, names = [], labels(scene)
     # The walls of an open volume are drawn in part, so they have no area.
     group = "force" if scene.is_open() else "pressure"
@@ -225,11 +225,11 @@ def _lines_of_walls(scene: Scene, shapes: list[Shape]) -> list[Line]:
 def plots_of(curves: Mapping[str, tuple[str, Floats, Floats]]) -> dict[str, dict[str, tuple[Floats, Floats]]]:
     """The curves of each plot of a picture, (times [s], values) by their names, by the key in `GRAPHS`.
 
-    They are given by their entities, as (name, times, values). In every picture they have the same order, and so the
+    The argument has (name, times, values) by entity. In every picture the curves have the same order, and so the
     same colours.
     """
     plots: dict[str, dict[str, tuple[Floats, Floats]]] = {}
-    # Recordings of other versions may have others.
+    # Recordings of other versions may have other entities.
     for path in sorted((path for path in curves if group_of(path) in GRAPHS), key=_place):
         name, times, values = curves[path]
         if not GRAPHS[group_of(path)].is_rare or values.any():
@@ -246,7 +246,7 @@ def says_nothing(group: str, curves: Mapping[str, tuple[Floats, Floats]]) -> boo
 
 
 def _place(path: str) -> tuple[int, ...]:
-    """The order of an entity: of its plot, of an energy, and of a surface by its number."""
+    """The sort key of an entity: its plot, its energy, and the number of its surface."""
     group, name = group_of(path), path.rpartition("/")[2]
     energy = ENERGIES.index(name) if name in ENERGIES else len(ENERGIES)
     return list(GRAPHS).index(group), energy, *map(int, re.findall(r"\d+", name))

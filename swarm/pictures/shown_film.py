@@ -1,4 +1,4 @@
-"""A film that shows itself in a notebook: its file is a part of the notebook."""
+"""A film that a notebook shows and contains."""
 
 import base64
 import tempfile
@@ -23,8 +23,8 @@ class Film:
     Attributes:
         content: the bytes of the file.
         suffix: ".mp4", or ".gif" where ffmpeg is not installed.
-        frames, fps, size: how many there are, how many a second, width and height in pixels.
-        name: of the trajectory.
+        frames, fps, size: their number, their number per second, and width and height in pixels.
+        name: the file name of the trajectory.
 
     It is kept in the notebook with the other output, and plays in a saved one without a kernel. See `Trajectory.film`.
     """
@@ -54,7 +54,7 @@ class Film:
         return f'<video controls loop muted autoplay playsinline {look} src="data:video/mp4;base64,{text}"></video>'
 
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
-        """Write the film to a file, `.mp4`, or `.gif` where it is one; returns the path.
+        """Write the film to a file, `.mp4`, or `.gif` if it is one; return the path.
 
         Raises:
             SceneError: another suffix, or the file exists.

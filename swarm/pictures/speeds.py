@@ -1,4 +1,4 @@
-"""How speeds are spread at the start and at the end of a run, beside the law of Maxwell."""
+"""The distribution of speeds at the start and at the end of a run, beside the law of Maxwell."""
 
 from typing import Any
 
@@ -9,15 +9,15 @@ from ..state import Floats
 from ..words.amounts import amount, prefixed
 from . import style
 
-# Most bins of a histogram, and fewest; of few speeds so many are in each.
+# The largest and smallest number of bins of a histogram; and the number of speeds in a bin if there are few.
 _BINS, _FEWEST, _EACH = 50, 8, 10
-# Speeds that differ by less than this part of themselves are one: an impact rounds them.
+# Speeds with a smaller relative difference are equal: an impact rounds them.
 _ALIKE = 1e-9
-# Up to this largest difference of the cumulated distributions the law of Maxwell says something.
+# Up to this largest difference of the cumulative distributions the law of Maxwell is informative.
 _NEAR = 0.1
-# A histogram with more than this part in one bin says nothing.
+# A histogram with more than this part in one bin is not informative.
 _ALL = 0.8
-# Room above a histogram for each row of the legend, as a part of its height.
+# The height above a histogram for each row of the legend, relative to its height.
 _ROW = 0.16
 Spread = dict[str, Floats]
 
@@ -40,7 +40,7 @@ def of_frames(content: Any) -> Spread:
 
 
 def _top(spread: Spread) -> float:
-    """The end of the axis of speeds: beyond a few that are far faster than all others."""
+    """The end of the axis of speeds, which leaves out a few that are far faster than all others."""
     return 1.05 * max(min(float(values.max()), 4.0 * float(np.quantile(values, 0.99))) for values in spread.values())
 
 
@@ -55,7 +55,7 @@ def of_all(content: Any) -> float | None:
 
 
 def below(speeds: Floats, mean_square: float, dimensions: int) -> Floats:
-    """The part of particles of one mass, with this mean square of speeds, that is below speeds by Maxwell's law.
+    """The fraction of speeds below `speeds` in Maxwell's law with this mean square, for particles of one mass.
 
     Squares of speeds over the mean square of a component have a chi-square distribution.
 
@@ -66,7 +66,7 @@ def below(speeds: Floats, mean_square: float, dimensions: int) -> Floats:
 
 
 def draw(axes: Any, content: Any, spread: Spread) -> None:
-    """Histograms of the speeds, and the law of Maxwell of the same mean energy where they are near it."""
+    """Draw histograms of the speeds, and the law of Maxwell of the same mean energy if they are near it."""
     top, bins = _top(spread), min(_BINS, max(_FEWEST, min(map(len, spread.values())) // _EACH))
     factor, unit = prefixed(top, "m/s")
     for name, values in spread.items():
@@ -90,7 +90,7 @@ def draw(axes: Any, content: Any, spread: Spread) -> None:
 
 
 def _law(axes: Any, content: Any, spread: Spread, bin_width: float, factor: float) -> None:
-    """The law of Maxwell of the last speeds, where these are near it."""
+    """Draw the law of Maxwell of the last speeds, if they are near it."""
     values, frame = list(spread.values())[-1], list(content.frames.values())[-1]
     masses = frame.mass
     if content.body is not None or np.ptp(masses) > 1e-9 * masses.max() or are_alike(values) or len(values) < _BINS:

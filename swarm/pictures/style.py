@@ -19,7 +19,7 @@ __all__ = [
     "BLUE", "CAVITY", "CAVITY_LINE", "CURVES", "ENERGIES", "GREEN", "GREY", "MAP", "ORANGE", "PINK", "RED", "SKY",
     "SOLID", "SOLID_LINE", "Picture", "applied", "backdrop", "ink", "picture",
 ]  # fmt: skip
-# What only guides the eye: laws beside measurements, limits, bands.
+# Lines that guide the eye: laws beside measurements, limits, bands.
 GREY = "#8A8A8A"
 # Walls of a cavity on a dark background.
 _CAVITY_IN_THE_DARK = "#3A4653"
@@ -41,7 +41,7 @@ class Picture(Figure):
 
 @contextlib.contextmanager
 def applied(dark: bool = False) -> Iterator[None]:
-    """What is drawn and saved in this context has the look, on a light or a dark background."""
+    """Draw and save pictures in this context with the look, on a light or a dark background."""
     names = ["swarm.pictures.look", *["swarm.pictures.dark"] * dark]
     with style.context(["default", *names]):
         yield
@@ -53,11 +53,11 @@ def picture(width: float, height: float) -> Picture:
 
 
 def backdrop() -> tuple[str, str]:
-    """The background of now, and the colour of the walls of a cavity on it: a light one would glare on a dark page."""
+    """The current background, and the colour of walls of a cavity on it: a light one would glare on a dark page."""
     paper = str(mpl.rcParams["figure.facecolor"])
     return paper, CAVITY if sum(to_rgb(paper)) > sum(to_rgb(CAVITY_LINE)) else _CAVITY_IN_THE_DARK
 
 
 def ink() -> str:
-    """The colour of text, and of what is the sum of all, on the background of now."""
+    """The colour of text, and of the sum of all, on the current background."""
     return str(mpl.rcParams["text.color"])

@@ -1,4 +1,4 @@
-"""A small triad of axes at a corner of a picture, a bar with a length, and how many are beyond it."""
+"""A small triad of axes at a corner of a picture, a bar with a length, and the number of particles beyond it."""
 
 import math
 from typing import Any
@@ -10,22 +10,22 @@ from ..words.amounts import amount
 from .eye import Eye
 
 INK = "#5a5a62"
-# Below a picture, the strip for them [points]; an arrow, the corner from which they go, and letters.
+# The strip below a picture for them [points]; an arrow, the corner where arrows begin, and letters.
 STRIP, _ARROW, _CORNER, _LETTERS = 42.0, 19.0, 15.0, 8.0
-# Of the width of a picture the bar has at most this part.
+# The largest width of the bar, as a part of the picture's.
 BAR = 0.28
-# Arrows that are seen shorter than this part are not drawn.
+# Arrows with a shorter projection than this part are not drawn.
 _SHORT = 0.15
 
 
 def round_length(most: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is not above a length."""
+    """The largest of 1, 2, 5 times a power of ten that is at most a length."""
     power = 10.0 ** math.floor(math.log10(most))
     return next((k * power for k in (5.0, 2.0) if k * power <= most), power)
 
 
 def draw_triad(axes: Any, eye: Eye, most: float) -> None:
-    """The directions of x, y and z at the lower left corner, and a bar of at most this length [m]."""
+    """Draw the directions of x, y and z at the lower left corner, and a bar of at most this length [m]."""
     corner = OffsetFrom(axes, (0.0, 0.0), unit="points")
     style = {"arrowstyle": "-|>,head_width=0.14,head_length=0.3", "color": INK, "linewidth": 0.9, "shrinkA": 0.0,
              "shrinkB": 0.0}  # fmt: skip
@@ -49,7 +49,7 @@ def draw_triad(axes: Any, eye: Eye, most: float) -> None:
 
 
 def say_beyond(axes: Any, outside: int) -> list[Any]:
-    """Say in a corner how many particles are beyond a picture, if any are; returns the artists."""
+    """Write in a corner how many particles are beyond a picture, if any are; return the artists."""
     if not outside:
         return []
     words = f"{outside} {'is' if outside == 1 else 'are'} beyond this picture"

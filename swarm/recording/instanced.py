@@ -1,8 +1,8 @@
-"""Fields of many solids in a recording: a few float32 for each, from which the viewer draws all of them by itself.
+"""Fields of many solids in a recording: a few float32 numbers for each, from which the viewer draws all solids itself.
 
-Balls are points with a radius, 16 bytes each, others ellipsoids, boxes, cylinders and capsules with their quaternions,
-36 to 40 bytes: a million balls take 18 MB and 2.5 s of one core. Beside them are curves of some, from which
-`swarm view` draws where there is no viewer.
+Balls are points with a radius, 16 bytes each; ellipsoids, boxes, cylinders and capsules have their quaternions, 36
+to 40 bytes: a million balls take 18 MB and 2.5 s of one core. Beside them are curves of a few solids, which
+`swarm view` draws if there is no viewer.
 """
 
 from typing import Any
@@ -19,13 +19,13 @@ _BALL_BYTES, _SOLID_BYTES = 16, 40
 
 
 def bytes_of(solids: Solids) -> int:
-    """Bytes in a recording."""
+    """Return the number of bytes in a recording."""
     each = _BALL_BYTES if solids.kind == "spheres" else _SOLID_BYTES
     return each * len(solids.centers) + sum(12 * len(curve) for curve in curves(solids))
 
 
 def log(stream: Any, path: str, solids: Solids, center: Floats, looks: tuple[Any, Any], static: bool) -> None:
-    """Log the solids of the wall of a path, in the colours of `looks`: of faces and of lines."""
+    """Log the solids of the wall of a path, in the colours `looks` of faces and of lines."""
     (*face, _clear), wire = looks
     stream.log(f"{path}/bodies", _archetype(solids, (solids.centers - center).astype(np.float32), face), static=static)
     lines = [curve - center for curve in curves(solids)]
@@ -46,7 +46,7 @@ def _archetype(solids: Solids, centers: Any, colour: Any) -> Any:
     radius, half = halves[:, 0], halves[:, 2]
     if solids.kind == "cylinders":
         return rr.Cylinders3D(lengths=2.0 * half, radii=radius, centers=centers, **turned)
-    # Those of the viewer begin at the centre of their first cap.
+    # The viewer's capsules begin at the centre of their first cap.
     straight = half - radius
     axes = matrices(solids.turns)[:, :, 2]
     begin = centers - (straight[:, None] * axes).astype(np.float32)

@@ -1,4 +1,4 @@
-"""The parts of a recording that do not change: layout, eye, walls, legend, time series, and what it shows in words."""
+"""The static parts of a recording: layout, eye, walls, legend, time series, and its description in words."""
 
 import math
 from typing import Any
@@ -23,7 +23,7 @@ from .playback import LINES, MESH, PARTICLES
 # The colours of matplotlib's pictures.
 _CAVITY, _SOLID = (*rgb(colours.CAVITY), 60), (*rgb(colours.SOLID), 255)
 _CAVITY_WIRE, _SOLID_WIRE = (*rgb(colours.CAVITY_LINE), 255), (*rgb(colours.SOLID_LINE), 255)
-# Plots that are seen at once, and which these are: those of other groups come after them.
+# The number of plots that are visible at once, and their groups: those of other groups come after them.
 _SEEN = 4
 _FIRST = (
     "energy",
@@ -37,7 +37,7 @@ _FIRST = (
     "penetration",
     "overlap",
 )
-# Between the faces of bodies, which have no shading.
+# The colour of the edges between faces of bodies, which have no shading.
 _EDGE = (10, 10, 12, 255)
 SOLID_LOOKS = _SOLID, _SOLID_WIRE
 _PATH = "/about"
@@ -48,12 +48,12 @@ _FILLED = 0.97
 
 
 def path_of(shape: Shape) -> str:
-    """The entity of a wall."""
+    """The path of the entity of a wall."""
     return f"/scene/{'solids' if shape.solid else 'surfaces'}/{shape.name}"
 
 
 def log_static(stream: Any, drawn: Drawn, shapes: list[Shape], center: Floats) -> None:
-    """Log the walls, and how particles and bodies look."""
+    """Log the walls, and the looks of particles and bodies."""
     stream.log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     sizes = rr.Radius.ui_points(2.0) if drawn.radius is None else drawn.radius
     stream.log(PARTICLES, rr.Points3D.from_fields(radii=sizes), static=True)
@@ -67,7 +67,7 @@ def log_static(stream: Any, drawn: Drawn, shapes: list[Shape], center: Floats) -
 
 
 def log_walls(stream: Any, shapes: list[Shape], center: Floats, static: bool = True) -> None:
-    """Log the walls, or those from the time of the stream on."""
+    """Log the walls, statically or from the current time of the stream on."""
     for shape in shapes:
         face, wire = (_SOLID, _SOLID_WIRE) if shape.solid else (_CAVITY, _CAVITY_WIRE)
         if len(shape.vertices):
@@ -95,7 +95,7 @@ def log_series(stream: Any, lines: list[series.Line]) -> None:
 
 
 def blueprint(lines: list[series.Line], noun: str, eye: Any = None, plane: str | None = None) -> rrb.Blueprint:
-    """The 3-D view, from an eye or from where it shows all, beside the plots, paused at the start."""
+    """The 3-D view, from an eye or from a place that shows all, beside the plots, paused at the start."""
     scene = rrb.Spatial3DView(
         origin="/scene", name=noun, background=BACKGROUND, line_grid=rrb.LineGrid3D(visible=False), eye_controls=eye
     )
@@ -118,7 +118,7 @@ def blueprint(lines: list[series.Line], noun: str, eye: Any = None, plane: str |
 
 
 def log_about(stream: Any, drawn: Drawn, scale: Scale, stride: int, center: Floats, plane: str | None = None) -> None:
-    """Log the meaning of the colours, what is shown of how many, the origin, and the plane of two dimensions."""
+    """Log the meaning of the colours, the numbers of shown and of all particles, the origin, and a plane."""
     of = f" of {many(drawn.count)}" if drawn.shown < drawn.count else ""
     every = f", every {stride}th frame" if stride > 1 else ""
     name, unit = colours.named(scale.quantity)
@@ -138,14 +138,14 @@ def log_about(stream: Any, drawn: Drawn, scale: Scale, stride: int, center: Floa
 
 
 def log_outcome(stream: Any, content: Content) -> None:
-    """Log the run in words, and whether it went well, when it has ended."""
+    """Log the run in words, and its verdicts, when it has ended."""
     stream.log(_PATH, rr.AnyValues(title=words.title(content), verdicts=verdicts.marked(content)), static=True)
 
 
 def eye_controls(plane: str | None, shapes: list[Shape], points: Floats, center: Floats) -> Any:
-    """The eye that sees all walls and the points (n, 3); None where these are at one place.
+    """The eye that sees all walls and the points (n, 3); None if these coincide.
 
-    It is given with the origin of the recording, `center`. That of a scene of two dimensions is above its plane.
+    It is relative to the origin of the recording, `center`. In a scene of two dimensions it is above the plane.
     """
     curves = [curve for shape in shapes for curve in (*shape.wires, shape.vertices) if len(curve)]
     every = np.concatenate([points[~np.isnan(points[:, 0])], *curves])
@@ -154,7 +154,7 @@ def eye_controls(plane: str | None, shapes: list[Shape], points: Floats, center:
     low, high = every.min(axis=0) - center, every.max(axis=0) - center
     eye, middle = _eye(plane, low, high), 0.5 * (low + high)
     place = middle + distance(eye, high - low) * eye.near
-    # About which the scene is turned by hand.
+    # The axis of rotations by hand.
     up = eye.up if plane else np.array([0.0, 0.0, 1.0])
     return rrb.EyeControls3D(position=place, look_target=middle, eye_up=up)
 
@@ -168,7 +168,7 @@ def _eye(plane: str | None, low: Floats, high: Floats) -> Eye:
 
 
 def distance(eye: Eye, size: Floats) -> float:
-    """The distance from the middle of a box from which all of its corners are seen.
+    """The distance of the eye from the middle of a box at which all its corners are visible.
 
     A corner lies x to the right of the middle, y above it, and z nearer. It is seen from the distance D if |x| and |y|
     are at most (D - z) times the tangents of half the angles of view.

@@ -1,4 +1,4 @@
-"""Recordings (.rrd) read back, and whether they are complete."""
+"""Recordings (.rrd) are read back, and their completeness is checked."""
 
 import os
 import subprocess
@@ -20,9 +20,9 @@ from ..triangles.shape import Shape
 
 _BEGIN = b"RRF"
 _ABOUT = ("quantity", "low", "high", "particles", "shown", "stride")
-# Recordings of older versions do not say them.
+# Recordings of older versions do not have these values.
 _NOUN, _CENTER, _PLANE, _TITLE, _VERDICTS = "noun", "center", "plane", "title", "verdicts"
-# The entities of particles, and of bodies; recordings are written with them too.
+# The entities of particles, and of bodies, also used by the writer.
 PARTICLES, LINES, MESH = "/scene/particles", "/scene/bodies/lines", "/scene/bodies/mesh"
 _POSITIONS, _COLOURS, _SCALARS = "Points3D:positions", "Points3D:colors", "Scalars:scalars"
 _RADII = "Points3D:radii"
@@ -32,7 +32,7 @@ _TRIANGLES, _PAINT, _NORMALS = "Mesh3D:triangle_indices", "Mesh3D:vertex_colors"
 
 Colours = NDArray[np.uint32]
 
-# Where walls are.
+# The entities of walls.
 _SURFACES, _SOLIDS = "/scene/surfaces/", "/scene/solids/"
 
 
@@ -40,18 +40,18 @@ class Playback:
     """A recording of swarm, read completely.
 
     Attributes:
-        numbers, times: of the frames, times in [s].
+        numbers, times: the numbers of the frames, and their times [s].
         entities: path -> number of rows.
         series: path -> (times, values).
         names: path -> name in the legend.
-        about: meaning of the colours: quantity, low, high; number of particles or bodies, how many are shown, stride of
+        about: meaning of the colours: quantity, low, high; number of particles or bodies, of shown ones, stride of
             frames; "noun": "particles" or "bodies"; "title": the run in words, if it ended.
-        verdicts: sentences on whether the run went well, "✓ walls: no particle ..."; None if it does not say so.
-        center: (3,) the origin of the positions in the file [m], which those given here are not less.
-        radius: of balls (n,) [m], None of points.
+        verdicts: sentences on the quality of the run, "✓ walls: no particle ..."; None if the file has none.
+        center: (3,) the origin of the positions in the file [m], already added to positions of this object.
+        radius: radii of balls (n,) [m], None for points.
 
     Raises:
-        SceneError: there is no such file, it is damaged or truncated, or not a recording of swarm.
+        SceneError: the file is missing, damaged or truncated, or not a recording of swarm.
     """
 
     def __init__(self, path: Path) -> None:
@@ -72,7 +72,7 @@ class Playback:
             warnings.simplefilter("ignore")  # about a missing footer, which is_whole reports
             chunks = RrdReader(self.path).stream().to_chunks()
         self.entities: dict[str, int] = {}
-        # By entity and column: what does not change, and where the row of a frame is.
+        # The constant data, and the row of each frame, by entity and column.
         self._static: dict[tuple[str, str], Any] = {}
         self._rows: dict[tuple[str, str], dict[int, tuple[Any, int]]] = {}
         scalars: dict[str, dict[int, float]] = {}
@@ -84,7 +84,7 @@ class Playback:
             batch = chunk.to_record_batch()
             columns = dict(zip(batch.schema.names, batch.columns, strict=True))
             if "frame" not in columns:
-                # Rerun may send what was logged at once as rows of one chunk.
+                # Rerun may store data that were logged at once as rows of one chunk.
                 self._static |= {
                     (entity, name): [one for one in column if one.is_valid][-1]
                     for name, column in columns.items()
@@ -129,13 +129,13 @@ class Playback:
         self._still = {wall: self._shape(wall, None) for wall in walls if wall not in changing}
         sizes = self._static.get((PARTICLES, _RADII))
         wide = np.array([] if sizes is None else sizes.as_py(), np.float64)
-        # Those of dots are below 0: points of the screen.
+        # Radii of dots are below 0: points of the screen.
         self.radius = wide if wide.size and (wide > 0.0).all() else None
         triangles = self._static.get((MESH, _TRIANGLES))
         self._triangles = np.array([] if triangles is None else triangles.as_py(), np.int64).reshape(-1, 3)
 
     def shapes_at(self, number: int) -> list[Shape]:
-        """The walls at the frame of this number: they may move, or come and go."""
+        """The walls at the frame of this number: they may move, appear and disappear."""
         found = []
         for wall in self._walls:
             shape = self._still.get(wall) or self._shape(wall, number)
@@ -146,8 +146,8 @@ class Playback:
         return found
 
     def _shape(self, wall: str, number: int | None) -> Shape:
-        """A wall as it is in the file, which comes and goes, or as it is at the frame of a number."""
-        # Its curves are sent whenever it comes or goes, its mesh where there is one.
+        """A wall as the file has it, or, if it appears and disappears, at the frame of a number."""
+        # Its curves are sent at each such change, its mesh where it has one.
         sent = self._rows.get((f"{wall}/levels", _STRIPS)) or self._rows.get((f"{wall}/wires", _STRIPS), {})
         latest = -1 if number is None else max((k for k in sent if k <= number), default=-1)
 
@@ -184,7 +184,7 @@ class Playback:
         return [] if column is None else column[row].as_py()
 
     def _points(self, entity: str, name: str, number: int) -> Floats:
-        """Positions (n, 3), with the origin of the file."""
+        """Positions (n, 3), relative to the origin of the scene."""
         return np.reshape(self._row(entity, name, number), (-1, 3)) + self.center
 
     def _colours(self, entity: str, name: str, number: int) -> Colours:
@@ -192,7 +192,7 @@ class Playback:
 
 
 def is_whole(path: Path) -> bool:
-    """Whether the file is complete: with the footer that every viewer needs."""
+    """Whether the file is complete and has the footer that every viewer needs."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -203,7 +203,7 @@ def is_whole(path: Path) -> bool:
 
 
 def repaired(path: Path, target: Path) -> Playback:
-    """Copy what can be read of a truncated recording to a complete one in another file.
+    """Copy the readable part of a truncated recording to a complete one in another file.
 
     Raises:
         SceneError: no frame can be read, or it is not a recording of swarm.
@@ -224,7 +224,7 @@ def repair(path: Path) -> Playback:
     """Repair a recording in place.
 
     Raises:
-        SceneError, FileError: as `repaired`; the file is unchanged.
+        SceneError, FileError: as for `repaired`; the file is unchanged.
     """
     require_file(path, "a recording (.rrd)")
     target = paths.part_of(path)
@@ -237,7 +237,7 @@ def repair(path: Path) -> Playback:
 
 
 def described(path: Path) -> tuple[Playback, bool]:
-    """A recording, and whether it is complete; if it is not, what could be repaired of it."""
+    """A recording, and whether it is complete; of an incomplete one the part that can be repaired."""
     require_file(path, "a recording (.rrd)")
     if is_whole(path):
         return Playback(path), True

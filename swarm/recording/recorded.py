@@ -18,16 +18,16 @@ def show(trajectory: Any, particles: int, color: str, megabytes: float) -> None:
 
 
 def record(trajectory: Any, path: Path | None, settings: Settings, overwrite: bool = False) -> Any:
-    """Make the recording of a `Trajectory`; returns its stream.
+    """Make the recording of a `Trajectory`; return its stream.
 
     Raises:
-        SceneError: the target exists, or the trajectory is damaged, or holds no frame.
+        SceneError: the target exists, or the trajectory is damaged, or has no frame.
         FileError: the recording cannot be written.
     """
     if path is None:
         return _record(trajectory, None, None, settings, overwrite)
     marks.check_target(path, overwrite, "recording")
-    # A part of a recording would look like a complete one, and the older file stays until there is a whole one.
+    # A part of a recording would look like a complete one, and the older file stays until the new one is complete.
     with named_when_whole(path) as part:
         return _record(trajectory, path, part, settings, overwrite)
 
@@ -39,7 +39,7 @@ def _record(trajectory: Any, path: Path | None, part: Path | None, settings: Set
     writer = RecordingWriter(path, overwrite, scene, method, start, frames, settings, body)
     writer.count, writer.numbers, writer.file = trajectory.count, trajectory.ids, part
     if np.isnan(start.position[0]).all():
-        # All come during the run.
+        # All particles come during the run.
         writer.colour_by(trajectory.frame(frames - 1))
     with writer as write:
         for first in range(0, frames, _AT_ONCE):

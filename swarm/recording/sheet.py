@@ -1,4 +1,4 @@
-"""Contact sheets: some frames of a recording and its time series in one picture."""
+"""Contact sheets: a few frames of a recording and its time series in one picture."""
 
 import tempfile
 from pathlib import Path
@@ -20,9 +20,9 @@ from .playback import Playback
 _COLUMNS = 3
 # [inches]: the width of a frame, and the height of a row of them.
 _CELL, _HIGH = 5.4, 5.0
-# The part of the width by which plots are counted into rows: they are wider than those beside particles.
+# The part of the width in which plots are arranged in rows: they are wider than those beside particles.
 _PLOT = 0.5
-# Of plots that would show nothing in any frame.
+# Sentences in place of plots that would be empty in all frames.
 _NONE = {
     "energy_error": "no error of the energy in any frame",
     "link_error": "no error of a link's length in any frame",
@@ -32,17 +32,17 @@ _NONE = {
 
 
 def draw_sheet(playback: Playback, target: Path, times: list[float] | None, with_viewer: bool | None) -> str:
-    """Draw the frames nearest to these times (None: the first, the middle and the last); returns what drew them.
+    """Draw the frames nearest to these times (None: the first, the middle and the last); return the program's name.
 
     Args:
         playback: the recording.
         target: the PNG to write.
         times: [s], within the recording.
-        with_viewer: True: by the Rerun viewer; False: by matplotlib; None: by the viewer if it can draw here.
+        with_viewer: True: by the Rerun viewer; False: by matplotlib; None: by the viewer if it works here.
 
     Raises:
         SceneError: a time is outside the recording.
-        RunError: the viewer is wanted and cannot draw.
+        RunError: the viewer is wanted and does not work here.
         FileError: the picture cannot be written.
     """
     numbers = _chosen(playback, times)
@@ -70,7 +70,7 @@ def _chosen(playback: Playback, times: list[float] | None) -> list[int]:
 def _pictures(
     playback: Playback, frames: list[int], folder: Path, with_viewer: bool | None
 ) -> tuple[list[Any] | None, str]:
-    """Pictures by the viewer, or None, and what draws them."""
+    """Return the viewer's pictures, or None, and the name of the drawing program."""
     reason = "--no-viewer" if with_viewer is False else viewer.no_driver()
     if reason is None:
         try:
@@ -106,7 +106,7 @@ def _sheet(playback: Playback, frames: list[int], found: list[Any] | None, by: s
 
 
 def _frames(top: Any, playback: Playback, frames: list[int], found: list[Any] | None) -> None:
-    """The frames: pictures of them that were found, or drawn here."""
+    """Draw the frames: the viewer's pictures, or our own."""
     about = playback.about
     across, cells, packed = PLANES.get(about.get("plane")), [], []
     for place, k in enumerate(frames):
@@ -125,7 +125,7 @@ def _frames(top: Any, playback: Playback, frames: list[int], found: list[Any] | 
 
 
 def title_of_sheet(playback: Playback) -> str:
-    """The run in words, as far as the recording says it, and how many are drawn where that is not all."""
+    """The title of the run, if the recording has it, and the number of drawn particles if some are left out."""
     about, frames = playback.about, len(playback.times)
     shown, every, noun = about["shown"], about["particles"], about["noun"]
     noun = {"particles": "particle", "bodies": "body"}.get(noun, noun) if every == 1 else noun
@@ -136,7 +136,7 @@ def title_of_sheet(playback: Playback) -> str:
 
 
 def _sentences(playback: Playback, every: dict[str, graphs.Curves]) -> list[str]:
-    """Whether the run went well, or, where the recording does not say so, what would be empty plots."""
+    """The verdicts on the run or, if the recording has none, sentences in place of empty plots."""
     if playback.verdicts is not None:
         return playback.verdicts
     return [text for group, text in _NONE.items() if group in every and series.says_nothing(group, every[group])]

@@ -22,10 +22,10 @@ _HERE = "127.0.0.1"
 
 
 def live_url(live: bool | str) -> str:
-    """The URL of the viewer that shows a run: the one given, one that listens on this machine, or a new one.
+    """The URL of the viewer that shows a run: the given one, that of a viewer on this machine, or of a new one.
 
     Raises:
-        SceneError: no viewer listens, and a new one has no screen.
+        SceneError: no viewer listens, and there is no screen for a new one.
     """
     if isinstance(live, str):
         return live
@@ -61,11 +61,11 @@ class _Viewer:
         )  # fmt: skip
 
     def wait_for(self, port: int) -> None:
-        """Return when it listens."""
+        """Return when the viewer listens on the port."""
         self.wait_until(lambda: _listens(port), "start")
 
     def wait_until(self, ready: Callable[[], Any], did: str) -> None:
-        """Return when it is ready."""
+        """Return when `ready` is true."""
         deadline = time.monotonic() + _PATIENCE
         while not ready():
             self.require_alive()
@@ -74,7 +74,7 @@ class _Viewer:
             time.sleep(_PAUSE)
 
     def require_alive(self) -> None:
-        """Raise a RunError with its last message if it has ended."""
+        """Raise a RunError with its last message if the viewer has ended."""
         if self.process.poll() is None:
             return
         self._messages.seek(0)
@@ -116,7 +116,7 @@ def headless(recording: Path) -> Iterator[Any]:
     """A viewer without a window that has loaded a recording: a `rerun.experimental.ViewerClient`.
 
     Raises:
-        RunError: it did not start, did not load it, or ended.
+        RunError: it did not start, did not load the recording, or ended.
     """
     from rerun.experimental import ViewerClient
 
@@ -138,7 +138,7 @@ def headless(recording: Path) -> Iterator[Any]:
     except RunError:
         raise
     except Exception as error:  # gRPC's errors have no type of their own
-        # If it has ended, its last message says more.
+        # If the viewer has ended, its last message says more.
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.process.wait(_DRAWING)
         process.require_alive()
@@ -148,7 +148,7 @@ def headless(recording: Path) -> Iterator[Any]:
 
 
 def pictures(recording: Path, numbers: list[int], folder: Path) -> list[Path]:
-    """Pictures of the 3-D view at these frames, as PNG in a folder.
+    """Draw pictures of the 3-D view at these frames, as PNG in a folder.
 
     Raises:
         RunError: the viewer did not start, or ended before it had drawn.

@@ -8,13 +8,13 @@ from typing import Any
 
 from ..common.extras import needed_by
 
-# Where the browser gets the viewer from: by default from this server.
+# The variable for the source of the viewer in the browser, and its default.
 _ASSET, _SERVER = "RERUN_NOTEBOOK_ASSET", ("app.rerun.io", 443)
 _PATIENCE = 3.0  # [s]
-# Pixels; the width is that of the cell.
+# The height in pixels; the width is that of the cell.
 _HEIGHT = 600
 
-# References to what is shown, for the life of the kernel: a viewer without a reference is closed before its browser
+# References to the displayed viewers, for the life of the kernel: a viewer without a reference is closed before its
 # has begun.
 _shown: list[Any] = []
 
@@ -29,16 +29,16 @@ def show(trajectory: Any, particles: int, color: str, megabytes: float) -> None:
 
 
 def bring_widget() -> None:
-    """Import the widget: its module decides when it is imported where browsers get the viewer from.
+    """Import the widget: on import its module determines the source of the viewer for browsers.
 
-    By default that is Rerun's server. Where this machine does not reach it, browsers get it from here, unless the
-    environment says otherwise.
+    By default that is Rerun's server. If this machine does not reach it, browsers get it from here, unless the
+    environment variable has another value.
     """
     chosen = _ASSET in os.environ or _is_reached()
     if not chosen:
         os.environ[_ASSET] = "serve-local"
     try:
-        with contextlib.redirect_stdout(io.StringIO()):  # it says what it does
+        with contextlib.redirect_stdout(io.StringIO()):  # it prints messages
             import rerun_notebook  # noqa: F401  Rerun imports it late, and says what to install in its own words
     finally:
         if not chosen:

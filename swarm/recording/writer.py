@@ -2,18 +2,18 @@
 
 /scene/particles              Points3D, a frame's; coloured; of bodies, their points; of particles also their mass and
                               number, static. A velocity would double the file
-/scene/bodies/lines, .../mesh LineStrips3D and Mesh3D of bodies, a frame's; which points a triangle has is static
+/scene/bodies/lines, .../mesh LineStrips3D and Mesh3D of bodies, a frame's; the points of each triangle are static
 /scene/surfaces/0_KIND/       mesh: Mesh3D, wires (edges) and levels: LineStrips3D; static; /scene/solids/... likewise;
-                              of one that moves also Transform3D, a frame's, from where it is at the start; where there
-                              are doors not static, but from each frame on in which others are there
+                              of a moving wall also Transform3D, a frame's, relative to the start; in a scene with
+                              doors not static, but from each frame on in which the walls change
                               fields of more than 2000 solids have bodies: Points3D with radii, Boxes3D, ... for mesh
 /energy/..., /energy_error, /penetration, /impacts, /pressure/0_KIND (or /force/...), /sliding, /heat/0_KIND   Scalars
 /overlap                      Scalars: of soft balls
 /time                         Scalars: the exact time [s], since `sim_time` counts nanoseconds
 /about                        meaning of the colours, as text and as values, the origin, and of a run that has ended
-                              `title` and `verdicts`, the run in words and whether it went well; static
+                              `title` and `verdicts`, the run in words and its quality; static
 
-Rerun's positions are float32. Those of a scene that is far from the origin are less its centre, `center` of /about.
+Rerun's positions are float32. In a scene far from the origin they are relative to its centre, `center` of /about.
 """
 
 import atexit
@@ -48,17 +48,17 @@ from ..words.content import Content
 from . import instanced, looks, viewer
 from .playback import LINES, MESH, PARTICLES, is_whole
 
-# Bytes of a particle (position and colour), of a line (ends, where it begins, colour), and at most of a number of a
+# Bytes of a particle (position and colour), of a line (ends, offset, colour), and at most of a number of a
 # time series, which may be a chunk of its own.
 _PARTICLE_BYTES, _LINE_BYTES, _NUMBER_BYTES = 16, 32, 2000
-# Bytes of what a particle has once: its mass and its number.
+# Bytes of the static data of a particle: its mass and its number.
 _FIXED_BYTES = 16
 _MEGABYTE = 1e6
-# Rows of the time series that are sent together, unless that takes longer than this [s].
+# Rows of the time series that are sent together, unless they take longer than this [s].
 _ROWS, _PATIENCE = 50, 0.5
-# Longest flush [s]: usually milliseconds, but it may never return if the file cannot be written.
+# The longest flush [s]: usually milliseconds, but it may never return if the file cannot be written.
 _LONGEST = 10.0
-# Bytes of a blueprint and of what is static besides surfaces, and more.
+# Bytes of a blueprint and of the static data besides surfaces, rounded up.
 _BEGINNING = 1 << 18
 # Rerun counts nanoseconds in 64 bits, 292 years; the exact time is in /time.
 _LATEST = 9.2e9
@@ -69,9 +69,9 @@ class Settings:
     """The choices of a recording.
 
     Args:
-        particles: the most that are recorded, evenly chosen; of bodies, the most points, and bodies are whole.
+        particles: the largest number of recorded particles, or points of whole bodies, evenly chosen.
         color: "speed" or "energy-error".
-        megabytes: the largest size; if there are too many frames, every k-th and the last are recorded.
+        megabytes: the largest size; if all frames exceed it, every k-th and the last are recorded.
         live: True to show it in a viewer on this machine during the run, or the URL of a viewer.
     """
 
@@ -87,7 +87,7 @@ class Settings:
 
 
 class RecordingWriter:
-    """A context that creates the recording and gives the function that appends frames.
+    """A context that creates the recording and returns the function that appends frames.
 
     `start` holds particles, or the points of copies of `body`; `frames` is the number of frames of the run. Without a
     path and a viewer the recording stays in memory, in `stream`.
@@ -106,12 +106,12 @@ class RecordingWriter:
     ) -> None:
         if path is not None:
             marks.check_target(path, overwrite, "recording")
-            # Asked first: a sink of Rerun that fails writes lines of its own.
+            # Tested first: a sink of Rerun that fails prints lines of its own.
             if not os.access(path if path.exists() else path.parent, os.W_OK):
                 raise FileError(f"cannot write the recording {path}: no permission")
         self._path, self._scene, self._method, self._settings = path, scene, method, settings
         self._last, self._body, self._start, self.count = frames - 1, body, start, len(start)
-        # Those of a trajectory may be some of its run.
+        # A trajectory may keep only a part of the particles.
         self.numbers: Any = np.arange(len(start))
         self._fed = start.births is not None or bool(np.isnan(start.position).any())
         self._drawn = drawn = Drawn(len(start), body, settings.particles, start.radius)
@@ -124,23 +124,23 @@ class RecordingWriter:
                 f"record_color must be 'speed' for bodies, got {settings.color!r}: their points exchange energy"
             )
         self.colour_by(start)
-        # The number, the time and the observables of frames with time series still to be sent, and of that before.
+        # The number, the time and the observables of frames with time series to be sent, and of the frame before.
         self._rows: list[tuple[int, float, dict[str, Any]]] = []
         self._before: list[tuple[int, float, dict[str, Any]]] = []
         self._due = 0.0
-        # The observables of all frames that are recorded, for the words about the run.
+        # The observables of all recorded frames, for the words about the run.
         self._seen: list[dict[str, Any]] = []
-        # Where walls come and go they are sent from each instant on, of which this is the number.
+        # Where walls appear and disappear, they are sent at each instant; this is the number of the last one.
         self._has_doors, self._instant = scene.has_doors() and not scene.moves(), -1
-        # How many have come by the last frame, where some come during the run and all of them are seen.
+        # The number of particles that have come by the last frame, if they come during the run and all are recorded.
         self._came: int | None = None
         self._failed = False
-        # Where it is written: until it is whole another name, if it is made of a trajectory.
+        # The file that is written: another name until it is complete, if it is made from a trajectory.
         self.file = path
         self._url = viewer.live_url(settings.live) if settings.live else None
 
     def colour_by(self, shown: Particles) -> None:
-        """The scale of colours is that of these particles, or bodies."""
+        """Set the scale of colours from these particles, or bodies."""
         points = self._drawn.points
         if self._body is None:
             position = points(shown.position)
@@ -162,7 +162,7 @@ class RecordingWriter:
         room = max(self._settings.megabytes * _MEGABYTE - fixed, frame)
         self._stride = math.ceil((self._last + 1) * frame / room)
         is_new = self.file is not None and not self.file.exists()
-        # Rerun never returns from a file that has no room for its blueprint.
+        # Rerun never returns from a file without room for its blueprint.
         if problem := no_room(self.file, _BEGINNING + fixed):
             if is_new and self.file is not None:
                 self.file.unlink(missing_ok=True)
@@ -180,14 +180,14 @@ class RecordingWriter:
                 self.stream.send_blueprint(blueprint)
             self.stream.flush(timeout_sec=_LONGEST)
             self._log_static(many)
-            # A full disk is noticed by a flush alone, and what is sent after it may never return.
+            # Only a flush notices a full disk, and a later `send` may never return.
             self.stream.flush(timeout_sec=_LONGEST)
         except (RuntimeError, ValueError) as error:
             raise self._error(f"cannot write the recording {self._path}", error) from error
         return self._write
 
     def _log_static(self, many: list[solids.Solids]) -> None:
-        """Log what does not change."""
+        """Log the static data."""
         self.stream.set_log_time_enabled(False)
         looks.log_static(self.stream, self._drawn, [] if self._has_doors else self._shapes, self._center)
         if self._body is None:
@@ -200,7 +200,7 @@ class RecordingWriter:
         looks.log_about(self.stream, self._drawn, self._scale, self._stride, self._center, self._scene.plane)
 
     def _error(self, what: str, error: Exception) -> FileError:
-        """The error of a recording that ends here."""
+        """Return the error of a recording that ends here."""
         self._failed = True
         # Closing the stream, or Rerun at the exit of the process, would wait forever for its dead thread.
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(self.stream))
@@ -217,7 +217,7 @@ class RecordingWriter:
             self.stream.flush(timeout_sec=_LONGEST)
             if self._url or self._path:
                 self.stream.disconnect()
-            # Rerun says nothing of an end that it could not write.
+            # Rerun reports no error if it could not write the end.
             if self.file is not None and not is_whole(self.file):
                 raise RuntimeError("its end could not be written")
         except (RuntimeError, ValueError) as problem:
@@ -248,7 +248,7 @@ class RecordingWriter:
                 walls = [(seen["wall_position"], seen["wall_orientation"]) for *_, seen in chosen]
                 self._send_walls(numbers, times, walls)
             self._send("/time", numbers, times, rr.Scalars.columns(scalars=times))
-            # A dozen series cost as much as the points of a few frames: rows are collected, but not for long.
+            # A dozen series cost as much as the points of a few frames: rows are collected for a short time.
             if len(self._rows) >= _ROWS or time.monotonic() > self._due:
                 self._send_rows()
             # Without a flush a full disk is not noticed, and the next `send` to the thread that it ended never returns.
@@ -257,13 +257,13 @@ class RecordingWriter:
             raise self._error(f"cannot write frame {numbers[0]} to the recording {self._path}", error) from error
 
     def _log_outcome(self) -> None:
-        """Log the run in words, as plots have it above and below."""
+        """Log the run in the words above and below its plots."""
         seen = {name: np.array([row[name] for row in self._seen]) for name in self._seen[0]}
         known, count = {"start": self._start}, self.count if self._came is None else self._came
         looks.log_outcome(self.stream, Content("", self._scene, self._method, self._body, count, seen, known))
 
     def _send_points(self, numbers: Any, times: Any, points: Any, colour: Any, lines: Any) -> None:
-        """Send points (frames, n, 3) with their colours, and what ties them together."""
+        """Send points (frames, n, 3) with their colours, and their lines and faces."""
         drawn, (frames, n, _three) = self._drawn, points.shape
         columns = rr.Points3D.columns(positions=points.reshape(-1, 3), colors=colour.ravel())
         self._send(PARTICLES, numbers, times, columns.partition([n] * frames))
@@ -277,7 +277,7 @@ class RecordingWriter:
             self._send(MESH, numbers, times, columns.partition([n] * frames))
 
     def _send_doors(self, numbers: list[int], times: list[float]) -> None:
-        """Send the walls that are there where these are others than before."""
+        """Send the present walls if they have changed."""
         for number, moment in zip(numbers, times, strict=True):
             instant = bisect.bisect_right(self._scene.instants, moment)
             if instant != self._instant:
@@ -290,13 +290,13 @@ class RecordingWriter:
                 self.stream.reset_time()
 
     def _log_solids(self, many: list[solids.Solids], static: bool) -> None:
-        """Log the fields of many solids, or those that are there from the time of the stream on."""
+        """Log the fields of many solids, statically or from the current time of the stream on."""
         for shape in self._shapes:
             for one in (one for one in many if one.surface == shape.surface):
                 instanced.log(self.stream, looks.path_of(shape), one, self._center, looks.SOLID_LOOKS, static)
 
     def _send_walls(self, numbers: Any, times: Any, walls: list[tuple[Any, Any]]) -> None:
-        """Send where the surfaces that move are, (position, orientation) a frame, from where they were drawn."""
+        """Send the places of moving surfaces, (position, orientation) a frame, relative to their first drawing."""
         for shape in self._shapes:
             surface = self._scene.surfaces[shape.surface]
             if shape.motion is not None or surface.motion is not None or surface.reacts():
@@ -304,7 +304,7 @@ class RecordingWriter:
                     since_start(self._scene, shape, moment, places) for moment, places in zip(times, walls, strict=True)
                 ]
                 turns, ways = (np.array(parts) for parts in zip(*moves, strict=True))
-                # From the centre: x1 - c = A (x0 - c) + (b + A c - c)
+                # Relative to the centre: x1 - c = A (x0 - c) + (b + A c - c)
                 ways = ways + (turns @ self._center - self._center)
                 columns = rr.Transform3D.columns(translation=ways, mat3x3=turns)
                 self._send(looks.path_of(shape), numbers, times, columns)

@@ -1,4 +1,4 @@
-"""Code that scene files name, as "module:Name": of those modules alone that the command line or the caller allows."""
+"""Code that scene files name, as "module:Name", only of modules that the command line or the caller allows."""
 
 import contextlib
 import importlib
@@ -15,7 +15,7 @@ from ..errors import SceneError
 
 _ALLOWED: ContextVar[tuple[str, ...]] = ContextVar("_ALLOWED", default=())
 _MODULE = r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*"
-# The names of the modules that were imported.
+# The names of the imported modules.
 imported: set[str] = set()
 # Folders that packages are installed in.
 _INSTALLED = {"site-packages", "dist-packages"}
@@ -23,10 +23,10 @@ _NAMED = re.compile(rf"({_MODULE}):([A-Za-z_]\w*)")
 
 
 def checked_modules(given: Any) -> tuple[str, ...]:
-    """The names of modules, from a list of them, or of names with commas between them.
+    """Return the names of modules, from a list of them, or of texts with commas.
 
     Raises:
-        SceneError: one is no name of a module.
+        SceneError: a name is not that of a module.
     """
     modules = list_of("plugins", given, 'names of modules, such as ["mylaws"]')
     found = []
@@ -40,7 +40,7 @@ def checked_modules(given: Any) -> tuple[str, ...]:
 
 @contextlib.contextmanager
 def allowed(given: Iterable[str]) -> Iterator[None]:
-    """Allow files to name what these modules define; they are imported, also from the current folder.
+    """Allow files to name objects of these modules; they are imported, also from the current folder.
 
     Raises:
         SceneError: there is no such module, or it raises an error.
@@ -56,7 +56,7 @@ def allowed(given: Iterable[str]) -> Iterator[None]:
 
 
 def _imported(name: str) -> Any:
-    """A module, which may be in the current folder."""
+    """Import a module, which may be in the current folder."""
     here = os.getcwd()
     added = here not in sys.path
     if added:
@@ -80,7 +80,7 @@ def _imported(name: str) -> Any:
 
 
 def files() -> dict[str, Path]:
-    """The files of the modules that were imported, by their names."""
+    """The files of the imported modules, by name."""
     found = {name: getattr(sys.modules.get(name), "__file__", None) for name in sorted(imported)}
     return {name: Path(file) for name, file in found.items() if file is not None}
 
@@ -104,7 +104,7 @@ def is_allowed(text: str) -> bool:
 
 
 def named(where: str, text: Any, what: str) -> Any:
-    """The object that a value of a file names; `where` is its key, `what` says what it should be.
+    """Return the object that a value of a file names; `where` is its key, `what` the expected kind.
 
     Raises:
         SceneError: the value does not name code, the module is not allowed, or the module has no object of that name.
@@ -125,7 +125,7 @@ def named(where: str, text: Any, what: str) -> Any:
 
 
 def class_of(where: str, text: Any, base: type[Any], what: str) -> Any:
-    """The class that a value of a file names, derived from `base`."""
+    """Return the class that a value of a file names, derived from `base`."""
     found = named(where, text, what)
     if not (isinstance(found, type) and issubclass(found, base)):
         raise SceneError(f"{where}: {text} must be {what}, derived from {base.__name__}, got {shown(found)}")

@@ -27,7 +27,7 @@ def counter_table(counter: Counter) -> dict[str, Any]:
 
 
 def counters_of(given: Any) -> tuple[Counter, ...]:
-    """The counters of such a text, or of [[counter]] tables."""
+    """The counters of a text of `counters_text`, or of [[counter]] tables."""
     given = tomllib.loads(given).get("counter", []) if isinstance(given, str) else given
     return tuple(_counter_of(table, f"counter[{k}]") for k, table in enumerate(_tables("counter", given)))
 
@@ -59,7 +59,7 @@ def _source_of(table: Any, where: str, scene: Scene) -> Source:
 
 
 def _place_of(given: Any, where: str, scene: Scene) -> Any:
-    """A surface, from its table or its number in a scene, or an opening of a surface or of a part by their numbers."""
+    """A surface, from its table or its number in a scene, or an opening of a surface or a part by their numbers."""
     if not isinstance(given, Mapping):
         return given
     if "opening" not in given or "kind" in given:

@@ -27,7 +27,7 @@ from ..surfaces.wall_law import WallLaw
 from . import plugins
 
 T = TypeVar("T")
-# What in the table of a surface are tables of surfaces.
+# Keys of a surface's table with tables of surfaces.
 NESTED = ("openings", "part")
 # Keys of a document that name files.
 FILES = ("from", "file")
@@ -36,19 +36,19 @@ _WORDS = {
     "float": "a number", "int": "a whole number", "str": "a text", "bool": "true or false", "array": "a list",
     "object": "a table",
 }  # fmt: skip
-# Keys that stand elsewhere, and where.
+# Keys that belong to another table, and their place.
 _ELSEWHERE = {
     **{key: f"; {key} belongs at the top, before the first table" for key in ("gravity", "period", "plane")},
     **dict.fromkeys(("position", "velocity"), '; places and velocities are in a file: from = "start.csv"'),
     "density": "; give the mass of each [kg] in its place",
     **{key: f"; {key} is a key of [method]" for key in ("dt", "penalty")},
 }
-# An array of more numbers is not written as text: HDF5 loses texts of 100 MB, and a million balls take 10 s to write.
+# A longer array is not written as text: HDF5 loses texts of 100 MB, and a million balls take 10 s to write.
 _LONG, _ARRAY = 1000, "sha256:"
 
 
 def texts_in(document: Any) -> Iterator[tuple[str, str]]:
-    """The texts of a document, and of all its tables and lists, each with its key or its place."""
+    """The texts of a document, and of all its tables and lists, each with its key or its index."""
     for key, value in document.items() if isinstance(document, dict) else enumerate(document):
         if isinstance(value, (dict, list)):
             yield from texts_in(value)
@@ -57,13 +57,13 @@ def texts_in(document: Any) -> Iterator[tuple[str, str]]:
 
 
 def files_in(document: Any) -> Iterator[str]:
-    """The names of the files of a document, which are a part of what it describes."""
+    """The names of the files of a document, which are a part of its content."""
     return (text for key, text in texts_in(document) if key in FILES)
 
 
 def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None, pairs: Any = None) -> Scene:
     """A scene from its tables: a list of surface tables; gravity, the period, the plane and the pairs, or None."""
-    # Balls need none.
+    # A scene of balls needs no surface.
     surfaces = [] if surfaces is None else surfaces
     if not isinstance(surfaces, list):
         raise SceneError(
@@ -76,7 +76,7 @@ def scene_of(surfaces: Any, gravity: Any, period: Any = None, plane: Any = None,
 
 
 def surface_of(table: Any, where: str) -> Surface:
-    """A surface from its table, in which those of its openings and of its parts may be."""
+    """A surface from its table, which may have tables of its openings and parts."""
     for key in NESTED if isinstance(table, Mapping) else ():
         if key in table:
             given = table[key]
@@ -88,7 +88,7 @@ def surface_of(table: Any, where: str) -> Surface:
 
 
 def opening_of(table: Any, where: str) -> Surface | Opening:
-    """An opening from its table, in which may be what it has besides a surface."""
+    """An opening from its table, which may have keys besides those of a surface."""
     mine = {key: table[key] for key in ("times", "between") if key in table} if isinstance(table, Mapping) else {}
     if not mine:
         return surface_of(table, where)
@@ -105,21 +105,21 @@ def method_of(table: Any) -> Method:
 
 
 class NamedMethod(Method):
-    """A user-defined method of which a file has the name and the numbers: its runs are read without its code."""
+    """A user-defined method as a file holds it, by name and numbers: its runs can be read without its code."""
 
     def numbers(self, scene: Scene) -> Any:
-        """Raise a `SceneError`: it does not run."""
+        """Raise a `SceneError`, since it cannot run."""
         name = type(self).__name__
         raise SceneError(f"method must be made by its class to run, got the name of a user-defined one, {name}")
 
 
 def method_by_name(table: dict[str, Any]) -> Method:
-    """A method from its table; of a user-defined one that is not allowed a `NamedMethod`, which does not run."""
+    """A method from its table; a `NamedMethod`, which cannot run, for a user-defined one that is not allowed."""
     module, colon, name = str(table.get("kind")).partition(":")
     if not colon or plugins.is_allowed(module):
         return method_of(table)
     given = {key: value for key, value in table.items() if key != "kind"}
-    # Of a class that a function defines, the name is `function.<locals>.Name`.
+    # The name of a class in a function is `function.<locals>.Name`.
     named = dataclasses.make_dataclass(
         name.rpartition(".")[2], given, bases=(NamedMethod,), namespace={"__module__": module}, frozen=True
     )
@@ -130,7 +130,7 @@ def method_by_name(table: dict[str, Any]) -> Method:
 def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) -> dict[str, Any]:
     """The table of a surface or a method: its kind, and every argument that is not None.
 
-    Of a long array it holds the name, a digest, under which `arrays` get it; None: the numbers themselves.
+    For a long array it has a digest as name, under which `arrays` get it; with None, it has the numbers.
     """
     if own := getattr(described, "table", None):  # of an OwnSurface
         return _with_nested(own(), described, arrays)
@@ -142,7 +142,7 @@ def table_of(described: Surface | Method, arrays: dict[str, Any] | None = None) 
 
 
 def _given(described: Any) -> dict[str, Any]:
-    """The fields of a dataclass that a file has, by their keys; TOML has no None."""
+    """The fields of a dataclass that files have, by their keys; TOML has no None."""
     fields = [field for field in kept_fields(type(described)) if not is_left_out(described, field)]
     given = {field.metadata.get("key", field.name): getattr(described, field.name) for field in fields}
     return {key: value for key, value in given.items() if value is not None}
@@ -185,7 +185,7 @@ def with_arrays(table: dict[str, Any], arrays: Mapping[str, Any]) -> dict[str, A
     """A surface's table with the long arrays that it names.
 
     Raises:
-        SceneError: it names a file, as no trajectory does: to read it would open any file of the machine.
+        SceneError: it names a file, as no trajectory does: reading it could open any file of the machine.
     """
     named = {key for key, value in table.items() if isinstance(value, str) and value.startswith(_ARRAY)}
     held = {key: np.asarray(arrays[value]) if key in named else value for key, value in table.items()}
@@ -199,7 +199,7 @@ def with_arrays(table: dict[str, Any], arrays: Mapping[str, Any]) -> dict[str, A
 
 
 def scene_table(scene: Scene, arrays: dict[str, Any] | None = None) -> dict[str, Any]:
-    """The tables of a scene; `arrays` as of `table_of`."""
+    """The tables of a scene; `arrays` as for `table_of`."""
     gravity = {} if scene.gravity is None else {"gravity": scene.gravity}
     period = {} if scene.period is None else {"period": [length or False for length in scene.period]}
     plane = {} if scene.plane is None else {"plane": scene.plane}
@@ -208,7 +208,7 @@ def scene_table(scene: Scene, arrays: dict[str, Any] | None = None) -> dict[str,
 
 
 def kept_fields(cls: type[Any]) -> list[dataclasses.Field[Any]]:
-    """The fields of a dataclass that a file has: not the options of a session, and nothing that is made of others."""
+    """The fields of a dataclass that files have: neither options of a session nor computed fields."""
     return [field for field in dataclasses.fields(cls) if field.metadata.get("in_file", True)]
 
 
@@ -230,7 +230,7 @@ def convert(table: Any, cls: type[T], where: str) -> T:
 
 
 def of_kind(table: Any, where: str, kinds: Mapping[str, type[T]], base: type[Any] | None = None) -> T:
-    """A dataclass from a table with a kind that says which: one of `kinds`, or code derived from `base`."""
+    """A dataclass from a table with a kind: one of `kinds`, or code derived from `base`."""
     if not isinstance(table, Mapping):
         raise SceneError(f"{where}: expected a table with a kind, got {table!r}")
     if "kind" not in table:
@@ -276,12 +276,12 @@ def _sentence(message: str, where: str, table: Mapping[str, Any], keys: Mapping[
 
 
 def _in_words(types: str) -> str:
-    """`float | array | null` is "a number or a list"; what is no name of a type stays."""
+    """A type in words: `float | array | null` is "a number or a list"; other words stay."""
     return " or ".join(_WORDS.get(one, one) for one in types.split(" | ") if one != "null") or "nothing"
 
 
 def with_laws(table: Any, where: str) -> Any:
-    """The table of a surface with its laws, and those of groups of a mesh, as objects; of some a file has the name."""
+    """The table of a surface with its laws, and those of groups of a mesh, as objects or, if user-defined, names."""
     if not isinstance(table, Mapping):
         return table
     if isinstance(table.get("laws"), list):
@@ -293,7 +293,7 @@ def with_laws(table: Any, where: str) -> Any:
 
 
 def _law_of(table: Any, where: str) -> WallLaw | str:
-    """A law of a wall from its table: of a kind, or of code that the caller allows."""
+    """A law of a wall from its table: of a built-in kind, or of code that the caller allows."""
     if isinstance(table, str) and "(" in table:
         return table  # a trajectory has the text of an object of user-defined code
     if not isinstance(table, Mapping):
@@ -317,7 +317,7 @@ def _law_of(table: Any, where: str) -> WallLaw | str:
 
 
 def table_of_law(law: Any) -> Any:
-    """The table of a built-in law. Of a user-defined law it is the name, as a file cannot hold its code."""
+    """The table of a built-in law; the name of a user-defined law, since a file cannot hold its code."""
     kind = ALL_LAWS.kind_of(type(law))
     if kind is None:
         return law if isinstance(law, str) else repr(law)

@@ -1,4 +1,4 @@
-"""Numbers as readers expect them: with units and their prefixes, grouped digits, words for small ones."""
+"""Numbers as readers expect them: with units and prefixes, grouped digits, words for small numbers."""
 
 import math
 from collections.abc import Sequence
@@ -6,12 +6,12 @@ from collections.abc import Sequence
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 _SMALL = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-# Numbers from here on keep their unit as it is: 0.5 m, not 500 mm.
+# Numbers from this one on keep their unit: 0.5 m, not 500 mm.
 _LEAST_WHOLE = 0.1
 
 
 def many(count: float) -> str:
-    """A number of things, its digits in groups from 10 000 on.
+    """A number with its digits in groups from 10 000 on.
 
     >>> many(5000), many(10_000), many(2_500_000)
     ('5000', '10 000', '2 500 000')
@@ -20,7 +20,7 @@ def many(count: float) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """So many of a thing, in digits.
+    """A number of things, in digits.
 
     >>> counted(1, "ball"), counted(2, "ball")
     ('1 ball', '2 balls')
@@ -29,7 +29,7 @@ def counted(count: int, noun: str) -> str:
 
 
 def counted_in_words(count: int, noun: str) -> str:
-    """So many of a thing, small numbers in words.
+    """A number of things, small ones in words.
 
     >>> counted_in_words(2, "ball"), counted_in_words(78, "peg"), counted_in_words(1, "egg")
     ('two balls', '78 pegs', 'an egg')
@@ -45,7 +45,7 @@ def one(noun: str) -> str:
 
 
 def plural_of(noun: str) -> str:
-    """A noun in the plural: of "block of stone" it is "blocks of stone"."""
+    """The plural of a noun: "blocks of stone" for "block of stone"."""
     first, of, rest = noun.partition(" of ")
     if first.endswith("hedron"):
         return f"{first[:-2]}a{of}{rest}"
@@ -88,7 +88,7 @@ def amount(value: float, unit: str, digits: int = 4) -> str:
 
 
 def amounts(values: Sequence[float], unit: str, digits: int = 4) -> str:
-    """Some numbers with one unit, and the prefix of the largest.
+    """Numbers with one unit, and the prefix of the largest.
 
     >>> amounts([0.002, 0.03], "m"), amounts([0.5, 0.5, 0.7], "m")
     ('2 and 30 mm', '0.5, 0.5 and 0.7 m')
@@ -102,7 +102,7 @@ def amounts(values: Sequence[float], unit: str, digits: int = 4) -> str:
 
 
 def prefixed(size: float, unit: str) -> tuple[float, str]:
-    """The factor of numbers of this size, and the unit that they have then; a power of a unit has no prefix."""
+    """The factor of numbers of this size and the unit with its prefix; powers of a unit have no prefix."""
     if unit == "kg":
         return (1.0, unit) if size >= _LEAST_WHOLE or size == 0.0 else _of_prefixes(size * 1e3, "g", 1e3)
     if size == 0.0 or "²" in unit.partition("/")[0] or "³" in unit or not unit or unit.startswith("1"):
@@ -120,7 +120,7 @@ def _of_prefixes(size: float, unit: str, factor: float) -> tuple[float, str]:
 
 
 def listed(texts: Sequence[str]) -> str:
-    """Some texts as a sentence lists them.
+    """Texts as a list in a sentence.
 
     >>> listed(["a", "b", "c"]), listed(["a"])
     ('a, b and c', 'a')
@@ -139,7 +139,7 @@ def place(point: Sequence[float]) -> str:
 
 
 def direction(vector: Sequence[float]) -> str:
-    """A direction: an axis by its name.
+    """A direction; an axis has its name.
 
     >>> direction((0.0, 0.0, -2.0)), direction((1.0, 1.0, 0.0))
     ('-z', '(0.7071, 0.7071, 0)')

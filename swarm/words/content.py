@@ -1,4 +1,4 @@
-"""The part of a run that plots, titles and verdicts are made of."""
+"""The content of plots, titles and verdicts: a part of a run."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -16,16 +16,16 @@ from .gone import Gone, gone_at, gone_of, without
 
 @dataclass(frozen=True)
 class Content:
-    """The part of a run that a picture shows.
+    """The data of a run that a picture shows.
 
     Attributes:
-        name: of the file, or "".
-        count: number of particles, or of points of bodies, that were run.
+        name: the name of the file, or "".
+        count: number of particles, or of points of bodies, in the run.
         seen: the observables, one entry a frame.
-        frames: the particles at the "start" and at the "end", as far as they are known.
-        gone: of each frame a mask of the particles that had escaped or been absorbed by then.
-        counters: the counters of the run, as far as a file keeps them.
-        births: when each particle came [s], NaN of those that did not, and from which source; None: not known.
+        frames: the particles at the "start" and at the "end", if they are known.
+        gone: for each frame, a mask of the particles that had escaped or been absorbed by then.
+        counters: the counters of the run, if the file keeps them.
+        births: the time at which each particle came [s], or NaN, and the number of its source; None: not known.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Content:
 
 
 def content_of(trajectory: Any) -> Content:
-    """The part of a `Trajectory` that a picture shows."""
+    """The data of a `Trajectory` that a picture shows."""
     trajectory.require_frames()
     last = len(trajectory) - 1
     numbers = {"start": 0, "end": last} if last else {"start": 0}
@@ -66,13 +66,13 @@ def content_of(trajectory: Any) -> Content:
 
 
 def births_of(trajectory: Any) -> tuple[NDArray[Any], NDArray[Any]] | None:
-    """When each particle of a `Trajectory` came, and from which source, as far as it keeps them."""
+    """The time at which each particle of a `Trajectory` came, and the number of its source; None if not kept."""
     known = trajectory.has_particles() and trajectory.has_births()
     return (trajectory.birth_time, trajectory.birth_source) if known else None
 
 
 def content_of_result(result: Any, what: str) -> Content:
-    """The part of a `Result` that a picture shows; `what` needs it, for the sentence of an error."""
+    """The data of a `Result` that a picture shows; `what` names their use in an error."""
     if result.scene is None or result.method is None:
         raise SceneError(f"{what} needs a Result that knows its scene and its method, got one without them")
     body = None if result.bodies is None else result.bodies.body

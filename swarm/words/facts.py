@@ -20,19 +20,19 @@ from .content import Content, content_of, content_of_result
 from .statements import Statement, rows_of
 from .verdicts import judged
 
-# A table has at most this many surfaces, and a statement this many numbers.
+# The largest number of surfaces in a table, and of numbers in a statement.
 MOST = 8
-# Observables with one number for each of these are stated; members of fields are too many.
+# Observables with a number for each of these are stated; members of fields are too many.
 _NUMBERED = ("surface", "part", "cavity", "source")
 
 
 def of_content(content: Content, most: int | None = None) -> list[Statement]:
-    """All statements on a run: what ran, whether it went well, and its numbers; of `most` surfaces (None: of all)."""
+    """All statements on a run: its setting, its verdicts, and its numbers; on `most` surfaces (None: on all)."""
     return [*of_setting(content, most), *judged(content), *of_numbers(content.seen)]
 
 
 def of_trajectory(trajectory: Any) -> dict[str, str]:
-    """The content of a `Trajectory`, and whether the run went well: the rows of a table."""
+    """The content of a `Trajectory` and the verdicts on its run, as rows of a table."""
     scene, seen = trajectory.scene, trajectory.observed() if len(trajectory) else {}
     if seen:
         stated = of_content(content_of(trajectory), MOST)
@@ -43,15 +43,15 @@ def of_trajectory(trajectory: Any) -> dict[str, str]:
 
 
 def of_result(result: Any) -> dict[str, str]:
-    """The outcome of a run: the rows of a table."""
+    """The outcome of a run, as rows of a table."""
     seen = result.observables
-    # What a second run of the kind will do.
+    # The pace of a second run of this kind, without compilation.
     met, noun = seen["impacts"][-1], "impacts"
     if "collisions" in seen:
         met, noun = met + seen["collisions"][-1], "impacts and collisions"
     rate = met / max(result.wall_time - result.compile_time, 1e-3)
     compiled = f", {result.compile_time:.2f} s of it compiling" if result.compile_time > 0.0 else ""
-    # A page counts all of the wall time: it is all that a file keeps.
+    # A page counts the whole wall time, since a file keeps no other one.
     rest = " in the rest" if result.compile_time > 0.0 else ""
     known = result.scene is not None and result.method is not None
     stated = of_content(content_of_result(result, "a summary"), MOST) if known else of_numbers(seen)
@@ -63,7 +63,7 @@ def of_result(result: Any) -> dict[str, str]:
 
 
 def of_log(log: Any) -> dict[str, str]:
-    """The content of an `ImpactLog`: the rows of a table."""
+    """The content of an `ImpactLog`, as rows of a table."""
     counts, crossings = log.counts(), log.crossings()
     met = len(log) - counts.sum() - crossings.sum()
     which = len(range(log.count)[:: log.kept]) if isinstance(log.kept, int) else len(log.kept)
@@ -81,7 +81,7 @@ def of_log(log: Any) -> dict[str, str]:
 
 
 def of_checksums(stored: Any) -> dict[str, str]:
-    """Whether all values of a file match their checksums, or the first that does not."""
+    """Whether all values of a file match their checksums, or the first value that does not."""
     if not stored.has_checksums():
         return {"checksums": "none: an older version wrote it"}
     try:
@@ -97,15 +97,15 @@ def file_size(path: Any) -> str:
 
 
 def frames_of(times: Any) -> str:
-    """How many frames there are, and from when to when."""
+    """The number of frames, and their first and last time."""
     return f"{len(times)}" + (f", {times[0]:g} s to {times[-1]:g} s" if len(times) else "")
 
 
-# --- What runs where -----------------------------------------------------------------------------------------
+# --- The setting ---------------------------------------------------------------------------------------------
 
 
 def of_setting(content: Content, most: int | None = None) -> list[Statement]:
-    """What runs where, by which method, and for how long; of `most` surfaces (None: of all)."""
+    """The particles, the scene, the method and the end of a run; with `most` surfaces (None: with all)."""
     seen = content.seen
     return [
         Statement("frames", frames_of(seen["time"])),
@@ -120,13 +120,13 @@ def of_setting(content: Content, most: int | None = None) -> list[Statement]:
 
 
 def _what_runs(content: Content) -> str:
-    """What runs, with masses and speeds at the start as far as frames are kept."""
+    """The particles or bodies, with masses and speeds at the start if frames are kept."""
     stated, frame = titles.of_particles(content), content.frames.get("start")
     if frame is None:
         return stated
     body, masses, velocity = content.body, frame.mass, frame.velocity
     if body is not None:
-        # Those of bodies, not of their points
+        # The masses of bodies, not of their points
         masses = np.array([body.mass_matrix.sum()])
         velocity = body.center_of(np.ascontiguousarray(velocity).reshape(3, len(body), -1))
     speeds = np.sqrt((velocity**2).sum(axis=0))
@@ -141,14 +141,14 @@ def _what_runs(content: Content) -> str:
 
 
 def _range(values: Any, unit: str) -> str:
-    """The least and the largest of some values, or the one that all have."""
+    """The smallest and the largest value, or the common one."""
     low, high = float(values.min()), float(values.max())
     same = high - low <= 1e-9 * abs(high)
     return amount(low, unit) if same else amounts([low, high], unit).replace(" and ", " to ")
 
 
 def of_sources(content: Content) -> list[Statement]:
-    """How many particles each source gave, of which size and mass, and when; [] where a file does not keep these."""
+    """The number of particles of each source, with sizes, masses and times; [] if the file does not keep them."""
     end = content.frames.get("end")
     if content.births is None or content.body is not None or end is None or len(end.mass) != content.count:
         return []
@@ -179,7 +179,7 @@ def _of_body(body: Body | None) -> list[Statement]:
 
 
 def _packing(content: Content) -> list[Statement]:
-    """The part of the volume that balls fill; [] for points, and where no volume is known."""
+    """The part of the volume that balls fill; [] for points, or without a known volume."""
     balls, scene = content.frames.get("start"), content.scene
     if balls is None or balls.radius is None or balls.volume is None or len(balls) != content.count:
         return []
@@ -188,7 +188,7 @@ def _packing(content: Content) -> list[Statement]:
 
 
 def of_surroundings(scene: Scene, most: int | None = None, impacts: Sequence[int] = ()) -> list[Statement]:
-    """The surfaces of a scene, at most so many, and the impacts on each; then what holds for the whole scene."""
+    """At most `most` surfaces of a scene and the impacts on each; then the properties of the whole scene."""
     stated, names, count = [], nouns.labels(scene), len(scene.surfaces)
     shown = count if most is None or count <= most else most - 1
     for i, surface in enumerate(scene.surfaces[:shown]):
@@ -205,7 +205,7 @@ def of_surroundings(scene: Scene, most: int | None = None, impacts: Sequence[int
 
 
 def _of_space(scene: Scene) -> list[Statement]:
-    """What holds for a whole scene: gravity, its period, its plane, what particles do to one another."""
+    """The properties of a whole scene: gravity, period, plane, and collisions of particles."""
     stated = [Statement("gravity", "none")]
     if scene.gravity is not None:
         size = amount(math.hypot(*scene.gravity), "m/s²")
@@ -226,7 +226,7 @@ def _of_space(scene: Scene) -> list[Statement]:
 
 
 def of_counters(counters: Sequence[Any], crossings: Any) -> list[Statement]:
-    """The counters of a run, as far as known, and how many particles crossed each; [] for a run without counters."""
+    """The known counters of a run, and the number of crossings of each; [] for a run without counters."""
     crossed, stated = [f"{many(out)} out, {many(back)} back" for out, back in np.asarray(crossings).tolist()], []
     for k in range(max(len(counters), len(crossed))):
         parts = crossed[k : k + 1]
@@ -239,7 +239,7 @@ def of_counters(counters: Sequence[Any], crossings: Any) -> list[Statement]:
 
 
 def of_method(method: Method) -> Statement:
-    """A method, its step and its other numbers by their names."""
+    """A method, its step and its other numbers, by name."""
     known = {"penalty", "exponent", "tolerance", "max_sweeps", "sliding_tolerance", "shortest_flight", "contact_step"}
     of_user = ALL_METHODS.kind_of(type(method)) is None
     left_out = {} if of_user else {one.name: one.default for one in fields(method)}  # type: ignore[arg-type]
@@ -260,12 +260,12 @@ def of_method(method: Method) -> Statement:
 
 
 def of_numbers(seen: dict[str, Any]) -> list[Statement]:
-    """What a run counted, and what each surface, part and source gave or took, without zeros."""
+    """The counts of a run, and the amounts that each surface, part and source gave or took, without zeros."""
     stated = [Statement(name, many(seen[name][-1])) for name in ("impacts", "collisions") if name in seen]
     if slid := seen.get("sliding_time", [0.0])[-1]:
         stated.append(Statement("sliding", f"{many(seen['sliding'][-1])} at the end, {amount(slid, 's')} in all"))
     if np.any(seen.get("dissipated_energy", 0.0)):
-        # Not of the total energy: the zero of the potential one is arbitrary.
+        # The total energy is left out: the zero of the potential energy is arbitrary.
         lost, first, last = (
             amount(float(seen[name][k]), "J")
             for name, k in (("dissipated_energy", -1), ("kinetic_energy", 0), ("kinetic_energy", -1))

@@ -20,7 +20,7 @@ def gone_of(ends: Any) -> Gone:
 
 
 def gone_at(trajectory: Any, k: int) -> Gone | None:
-    """A mask of the particles that left by a frame of a trajectory; None for a run of bodies."""
+    """A mask of the particles that have left by a frame of a trajectory; None for a run of bodies."""
     return None if trajectory.body else gone_of((trajectory.escape_times(k), trajectory.absorbed_times(k)))
 
 

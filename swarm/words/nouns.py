@@ -1,4 +1,4 @@
-"""Surfaces in words: what each is, how large, its laws, and how it moves."""
+"""Surfaces in words: the noun, the size, the laws, and the motion of each."""
 
 import math
 from collections import Counter
@@ -14,9 +14,9 @@ from ..surfaces.surface import Surface
 from ..surfaces.union import Place, part_at
 from .amounts import amount, amounts, counted, counted_in_words, direction, listed, many, one, place, plain
 
-# Within this angle of straight down or up a plane is a floor or a lid [cosine].
+# A plane within this angle of straight down or up is a floor or a lid [cosine].
 _LEVEL = 1.0 - 1e-6
-# What of a description is a length or lengths, and how it is said.
+# The fields of a surface that are lengths, and their names.
 _SIZES = {
     "radius": "radius", "radii": "radii", "semi_axes": "semi-axes", "half_widths": "half widths", "length": "length",
     "lengths": "lengths", "major_radius": "major radius", "minor_radius": "minor radius", "half_width": "half width",
@@ -25,7 +25,7 @@ _SIZES = {
 
 
 def noun_of(surface: Surface, scene: Scene | None = None) -> str:
-    """What a surface is called: a solid sphere is a ball, and a plane at the bottom a floor."""
+    """The noun of a surface: a solid sphere is a ball, and a plane at the bottom a floor."""
     kind, solid = type(surface).__name__, surface.is_solid()
     flat = scene is not None and scene.plane is not None
     if kind == "Plane" and scene is not None and scene.gravity is not None:
@@ -34,7 +34,7 @@ def noun_of(surface: Surface, scene: Scene | None = None) -> str:
         return "floor" if down > _LEVEL else "lid" if down < -_LEVEL else "slope" if down > 1e-9 else "wall"
     if surface.nouns is not None:
         return surface.nouns[2 * flat + solid]
-    # A kind of a plugin.
+    # The name of a plugin's class.
     return "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in kind).strip()
 
 
@@ -44,7 +44,7 @@ def number_of(surface: Surface) -> int:
 
 
 def labels(scene: Scene) -> dict[tuple[int, Place], str]:
-    """What each surface, and each part of a union, is called in legends: alone by its noun, else with a number.
+    """The name of each surface, and of each part of a union, in legends: its noun, with a number if it is not alone.
 
     >>> import swarm
     >>> labels(swarm.Scene([swarm.Sphere(1.0), swarm.Plane((1, 0, 0)), swarm.Plane((-1, 0, 0), 0.5)]))
@@ -65,7 +65,7 @@ def labels(scene: Scene) -> dict[tuple[int, Place], str]:
 
 
 def moves_how(surface: Surface) -> str:
-    """What moves a surface, as the end of "a drum that ..."; "" for a surface at rest."""
+    """The motion of a surface, as the end of "a drum that ..."; "" for a surface at rest."""
     if surface.reacts():
         return "impacts swing" if surface.mass is None or surface.inertia is not None else "impacts push"
     kinds = {type(part).__name__ for part in getattr(surface.motion, "parts", (surface.motion,))}
@@ -102,7 +102,7 @@ def size_of(surface: Surface) -> str:
 
 
 def in_full(surface: Surface, scene: Scene | None = None) -> str:
-    """A surface in full: what it is, its size, where it is, its laws, its openings and its motion."""
+    """A surface in full: its noun, its size, its place, its laws, its openings and its motion."""
     number, noun = number_of(surface), noun_of(surface, scene)
     texts = [counted_in_words(number, noun) if number > 1 else one(noun)]
     if size := size_of(surface):
@@ -121,7 +121,7 @@ def in_full(surface: Surface, scene: Scene | None = None) -> str:
 
 
 def _of_mesh(surface: Any) -> list[str]:
-    """How far a surface is from the mesh that it is made of, and how far corners were moved to close seams."""
+    """The distance of a surface from its mesh, and the largest move of a corner to close seams."""
     error, moved = getattr(surface, "mesh_error", None), getattr(surface, "mesh_weld", None)
     texts = [] if error is None else [f"within {amount(error, 'm', 2)} of its mesh"]
     return texts + ([f"corners moved by up to {amount(moved, 'm', 2)} to close seams"] if moved else [])

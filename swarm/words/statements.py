@@ -10,9 +10,9 @@ class Statement(NamedTuple):
     """A statement on a run.
 
     Attributes:
-        label: its subject, as "energy".
+        label: its subject, such as "energy".
         text: the statement, in words.
-        verdict: whether what should hold does; None: a fact that has no limit.
+        verdict: whether the statement's condition holds; None: a fact without a limit.
     """
 
     label: str

@@ -13,15 +13,15 @@ from ..surfaces.union import part_at
 from . import nouns
 from .amounts import amount, amounts, counted, counted_in_words, listed, many, one
 
-# Most letters of a title.
+# The largest number of letters of a title.
 LONGEST = 90
-# The parts of a title that are left out where it is too long, the least telling first; 0 is all.
+# The number of parts that are left out of a title that is too long, the least informative first.
 _BREVITY = range(7)
 _FEW = 3
 
 
 def of_scene(scene: Scene, brief: int = 0) -> str:
-    """What a scene is: the vessel, what is in it, gravity, and what its walls do; less the larger `brief` is.
+    """A scene: the vessel, its content, gravity, and the effects of walls; shorter for a larger `brief`.
 
     >>> import swarm
     >>> ball = swarm.Sphere(0.2, side="outside")
@@ -62,7 +62,7 @@ def _around(scene: Scene, around: list[Surface], brief: int) -> str:
 
 
 def _several(scene: Scene, surfaces: list[Surface], brief: int) -> str:
-    """Some surfaces, those of one name together: "two balls, 78 pegs and a drum that turns"."""
+    """Surfaces, grouped by name: "two balls, 78 pegs and a drum that turns"."""
     found: Counter[tuple[str, str]] = Counter()
     for surface in surfaces:
         moves = nouns.moves_how(surface) if brief < 4 else ""
@@ -80,7 +80,7 @@ def _several(scene: Scene, surfaces: list[Surface], brief: int) -> str:
 
 
 def _compound(scene: Scene, surfaces: list[Surface], noun: str) -> str:
-    """A union or an intersection by the names of its parts."""
+    """A union or an intersection, by the names of its parts."""
     whole: Any = next(one for one in surfaces if nouns.noun_of(one, scene) == noun)
     if any(part.parts for part in whole.parts):
         return f"{one(noun)} of {len(whole.parts)} parts"
@@ -89,7 +89,7 @@ def _compound(scene: Scene, surfaces: list[Surface], noun: str) -> str:
 
 
 def _laws(scene: Scene) -> str:
-    """What the walls do to the energy or the number of particles, as the end of a title."""
+    """The effects of walls on the energy or the number of particles, as the end of a title."""
     pieces = [*scene.surfaces, *(part_at(scene.surfaces[i], where) for i, where in scene.parts)]
     kinds = {type(law).__name__ for piece in pieces for law in piece.laws}
     adjectives = ["warm"] * (any(piece.temperature is not None for piece in pieces) or "CercignaniLampis" in kinds)
@@ -101,11 +101,11 @@ def _laws(scene: Scene) -> str:
     return (f", {' and '.join(adjectives)} walls" if adjectives else "") + doors
 
 
-# --- What runs -------------------------------------------------------------------------------------------
+# --- Particles -------------------------------------------------------------------------------------------
 
 
 def of_particles(content: Any) -> str:
-    """What runs: so many particles, balls or bodies.
+    """The number of particles, balls or bodies, with their noun.
 
     `content` is the `Content` of a run.
     """
@@ -122,7 +122,7 @@ def of_particles(content: Any) -> str:
 
 
 def count_of(content: Any) -> int:
-    """How many particles, or points of bodies, a run has had: of those of its sources the ones that have come."""
+    """The number of particles, or points of bodies, in a run; from sources only those that have come."""
     end = content.frames.get("end")
     if "born" in content.seen and end is not None and len(end.mass) == content.count:
         return int(np.count_nonzero(~np.isnan(end.position[0])))
@@ -130,7 +130,7 @@ def count_of(content: Any) -> int:
 
 
 def noun_of_body(body: Body) -> str:
-    """What one body is called, by its points and ties.
+    """The noun of a body, by its points and ties.
 
     >>> import swarm
     >>> noun_of_body(swarm.dumbbell(0.1, 1.0))
@@ -150,7 +150,7 @@ def noun_of_body(body: Body) -> str:
 
 
 def of_method(method: Method) -> str:
-    """A method as a title says it: its name and its step.
+    """A method in a title: its name and its step.
 
     >>> import swarm
     >>> of_method(swarm.Impact()), of_method(swarm.AugmentedLagrangian(dt=1e-3, penalty=1e4))
@@ -163,7 +163,7 @@ def of_method(method: Method) -> str:
 
 
 def title(content: Any) -> str:
-    """A run in fewer than 90 letters: what runs where, by which method, for how long."""
+    """A run in fewer than 90 letters: its particles, its scene, its method and its end."""
     what, end = of_particles(content), amount(float(content.seen["time"][-1]), "s")
     came = " from sources" * ("born" in content.seen)
     step, name = of_method(content.method), of_method(content.method).split(",")[0]

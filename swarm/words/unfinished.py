@@ -1,4 +1,4 @@
-"""Whether the run of a trajectory has come to its end, and how it goes on."""
+"""Notes on the run of a trajectory that is not complete, and how to resume it."""
 
 import contextlib
 import itertools
@@ -9,9 +9,9 @@ from ..files import paths
 from ..files.lock import is_written
 from .amounts import amount
 
-# A frame at the end of a run is there to round-off.
+# The relative round-off of the time of the last frame.
 _ROUND_OFF = 1e-9
-# So many scene files of a folder are looked at for that of a run.
+# The largest number of scene files in a folder that are compared with that of the run.
 _LOOKED_AT = 1000
 
 
@@ -23,7 +23,7 @@ class Note(NamedTuple):
 
 
 def unfinished(trajectory: Any) -> Note | None:
-    """Of a run that goes on or was cut, what to know about it; None: it is complete, as far as the file says."""
+    """A note on a run that is going on or was cut off; None: it is complete, as far as the file tells."""
     times, until = trajectory.times, trajectory.until
     last = float(times[-1]) if len(times) else 0.0
     if until is None and trajectory.scene_text is not None:

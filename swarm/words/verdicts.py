@@ -1,8 +1,8 @@
-"""Whether a run went well: a sentence with its figure for each thing that should hold.
+"""Verdicts on a run: a sentence with its figure for each quantity that should be kept.
 
-Limits are what the arithmetic of a method allows. A number is rounded to 1.1e-16 of itself once or a few times in an
-impact or a step, so errors of round-off grow at most in proportion to their number; measured ones grow far less, and up
-to 1e5 impacts of a particle the project's own tests ask for 1e-12.
+Limits follow from the arithmetic of a method. A number is rounded to 1.1e-16 of itself once or a few times in an
+impact or a step, so errors of round-off grow at most in proportion to their number; measured errors grow far less, and
+up to 1e5 impacts of a particle the project's own tests require 1e-12.
 """
 
 from typing import Any
@@ -16,24 +16,24 @@ from ..pairs import MOST_PRESSED
 from .amounts import amount, counted_in_words, listed, many, plain
 from .statements import Statement, lines_of
 
-# Of whatever should be kept: the bound of the project's tests.
+# The bound of the project's tests for a quantity that should be kept.
 ROUND_OFF = 1e-12
-# Methods that keep the energy to round-off or to their tolerance: the others are said to drift.
+# Methods that keep the energy to round-off or to their tolerance: verdicts on others say that they drift.
 _CONSERVING = ("Impact", "Penalty", "AugmentedLagrangian")
 
 
 def judged(content: Any) -> list[Statement]:
-    """The verdicts on a run, of what plots show of it (`Content`)."""
+    """The verdicts on the `Content` of a run."""
     found = _numbers(content)
     if any(one.verdict is False for one in found):
-        return found  # with values that are not finite other verdicts mean nothing
+        return found  # verdicts on infinite or undefined values would mean nothing
     for judge in (_energy, _balance, _penetration, _overlap, _momentum, _multipliers, _links, _books):
         found[-1:-1] = judge(content)
     return found
 
 
 def marked(content: Any) -> list[str]:
-    """The verdicts as lines of a picture; that on numbers only if some values are not finite."""
+    """The verdicts as lines of a picture; the one on numbers only if some values are not finite."""
     return lines_of(one for one in judged(content) if one.label != "numbers" or not one.verdict)
 
 
@@ -73,7 +73,7 @@ def _numbers(content: Any) -> list[Statement]:
 
 
 def _energy(content: Any) -> list[Statement]:
-    """The worst particle, its books of losses and heat included."""
+    """The energy of the worst particle, with its losses and heat."""
     worst, limit = float(content.seen["energy_error"].max()), energy_limit(content)
     one, name = "particle" if content.body is None else "body", type(content.method).__name__
     figure = f"the worst {one}'s error is {plain(worst, 2)} of its energy"
@@ -90,7 +90,7 @@ def _energy(content: Any) -> list[Statement]:
 
 
 def _balance(content: Any) -> list[Statement]:
-    """The energy of all against what walls, sources and anchors have taken and given."""
+    """The energy of all particles against the energy that walls, sources and anchors took and gave."""
     changes, part = books(content.seen), drift(content.seen)
     limit = energy_limit(content)
     holds = part <= limit
@@ -111,7 +111,7 @@ def _balance(content: Any) -> list[Statement]:
 
 
 def _penetration(content: Any) -> list[Statement]:
-    """How far outside a wall a particle was."""
+    """The largest distance of a particle outside a wall."""
     if not content.scene.surfaces:
         return []
     deepest, one = float(content.seen["max_penetration"].max()), "particle" if content.body is None else "point"
@@ -131,7 +131,7 @@ def _penetration(content: Any) -> list[Statement]:
 
 
 def _overlap(content: Any) -> list[Statement]:
-    """How deep soft balls pressed on one another and on walls, at any step."""
+    """The largest depth at which soft balls pressed on one another and on walls, at any step."""
     radius = next((frame.radius for frame in content.frames.values() if frame.radius is not None), None)
     if "largest_overlap" not in content.seen or radius is None:
         return []
@@ -157,13 +157,13 @@ def penetration_limit(content: Any) -> float:
 
 
 def reach_of(scene: Any) -> float:
-    """The distance from the origin within which walls are [m]: numbers of that size are rounded."""
+    """The largest distance of walls from the origin [m]: numbers of that size are rounded."""
     sizes = [scene.finite_size(), *(surface.extent() for surface in scene.surfaces)]
     return float(max(size for size in sizes if np.isfinite(size)))
 
 
 def _momentum(content: Any) -> list[Statement]:
-    """Momentum, which nothing changes in a cell that repeats, without walls and gravity."""
+    """The momentum, which is constant in a periodic cell without walls and gravity."""
     scene, seen = content.scene, content.seen
     if scene.surfaces or scene.gravity is not None or content.body is not None or "born" in seen:
         return []
@@ -177,7 +177,7 @@ def _momentum(content: Any) -> list[Statement]:
 
 
 def _multipliers(content: Any) -> list[Statement]:
-    """Whether loops of multipliers, or sweeps over the contacts of grains, ended by themselves."""
+    """Whether loops of multipliers, or sweeps over the contacts of grains, have converged."""
     failed = int(content.seen["unconverged"][-1])
     if not content.method.has_multipliers():
         less = f"{counted_in_words(failed, 'step')} met friction, or a damper, to fewer digits than others"
@@ -200,9 +200,9 @@ def _links(content: Any) -> list[Statement]:
 
 
 def _books(content: Any) -> list[Statement]:
-    """Whether the numbers of particles balance: all are inside, or were absorbed, or escaped.
+    """Whether the numbers of particles balance: all are inside, were absorbed, or escaped.
 
-    Empty for a run without sources that no particle left.
+    The list is empty for a run without sources that no particle left.
     """
     seen, body = content.seen, content.body
     ends = {"escaped": int(seen["escaped"][-1]), "absorbed": int(np.sum(seen.get("absorbed", [0])[-1]))}
@@ -234,13 +234,13 @@ def _books(content: Any) -> list[Statement]:
 
 
 def knows_start(content: Any) -> bool:
-    """Whether it is known how many particles were there at the start: not all births of balls find a place."""
+    """Whether the number of particles at the start is known: not all births of balls find a place."""
     frame = content.frames.get("start")
     return "blocked" not in content.seen or (frame is not None and len(frame.mass) == content.count)
 
 
 def at_start(content: Any) -> int:
-    """How many particles were there before any came from a source."""
+    """The number of particles before any came from a source."""
     frame, born = content.frames.get("start"), content.seen.get("born")
     if born is None:
         return int(content.count)
