@@ -1,4 +1,4 @@
-"""Walls that stand upright on a plane: walls whose normals are in the plane up to round-off, corrected to be in it.
+"""Walls that stand upright on a plane: their normals are in the plane up to round-off, and are corrected to be in it.
 
 In a scene of two dimensions a wall that leans by round-off would send particles off the plane, and walls that disperse
 particles increase the deviation at every impact.
