@@ -169,7 +169,7 @@ class Members(Record):
     # --- For a field that moves: see safe.py ---
 
     def loosened(self, reach):
-        """Return the field for places in its frame whose round-off is larger by that of `reach` [m]."""
+        """Return the field for places in its frame with a round-off that is larger by that of `reach` [m]."""
         return self
 
     def until_out(self, cell, gravity, r, v):

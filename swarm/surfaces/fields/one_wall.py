@@ -78,7 +78,7 @@ class OneWall(Smooth):
         return LevelStep(gap, 0.0, min(longest, max(-gap, 0.0) / speed) if speed > 0.0 else longest)
 
     def loosened(self, reach):
-        """Return the wall for places in its frame whose round-off is larger by that of `reach` [m]."""
+        """Return the wall for places in its frame with a round-off that is larger by that of `reach` [m]."""
         return self._replace(members=self.members.loosened(reach))
 
     def clearance(self, r):

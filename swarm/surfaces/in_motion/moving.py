@@ -101,7 +101,7 @@ class Marched(Carried):
 
 
 class Strided(Marched):
-    """`Marched` walls whose safe steps are all taken in lanes: see strides.py."""
+    """`Marched` walls with all safe steps taken in lanes: see strides.py."""
 
 
 class Aimed(Strided):
