@@ -42,7 +42,7 @@ class Counter:
 
 
 def require_bare(name: str, given: Any, why: str) -> None:
-    """Raise a `SceneError` unless `given` is a surface with no other argument than its shape and place."""
+    """Raise a `SceneError` unless `given` is a surface with arguments for its shape and place only."""
     if not isinstance(given, Surface):
         raise SceneError(f"{name} must be a surface such as swarm.Plane, got {shown(given)}")
     for law in fields(Surface):

@@ -157,7 +157,7 @@ class Facets(Members, Patched):
         """Whether a flight to the plane of a facet passes at r, which is nearer to one that is turned the other way.
 
         Two such facets meet at a saddle vertex. Each extends beyond its edges by the round-off of places; where both
-        do a flight between them would have no end. The facet is met that the place belongs to, or that is nearer.
+        do a flight between them would have no end. The facet that the place belongs to, or that is nearer, is met.
         """
         one, (first, stop) = member(self, m), entries_at(self.grid, r)
         room, within = self.like.room.value, one.within(r)
@@ -249,7 +249,7 @@ def _normals(a: Floats, b: Floats, c: Floats) -> Floats:
 
 
 def with_room(facets: Facets, mesh: Any, is_solid: bool) -> Facets:
-    """Return the facets with the free blocks around each cell; with no `mesh` all empty cells are free."""
+    """Return the facets with the free blocks around each cell; without a `mesh` all empty cells are free."""
     from scipy.ndimage import label
 
     grid = facets.grid
