@@ -2,8 +2,8 @@
 
 To add one, write a file in shapes/ with a dataclass derived from `Surface`, for users, and a record derived from
 `contract.Smooth`, which describes all methods, for kernels; then name the dataclass in ALL_SURFACES.
-examples/own_surface.py is a complete surface. If a method of simulation needs what is missing, an error says so before
-the run.
+examples/own_surface.py is a complete surface. If a method of simulation needs a method that the surface lacks, an
+error names it before the run.
 """
 
 from typing import TYPE_CHECKING, Any

@@ -1,8 +1,8 @@
 """Points of surfaces, uniform in their area, or in their length in a plane.
 
-Each surface says how its points are drawn exactly. Those of spheres, tori, triangles and outlines are drawn directly.
-Any other wall is a quadric or a plane: lines that are uniform and isotropic in a ball, or in a plane in a disc, meet
-every piece of an area equally often (Crofton), however it is turned.
+Each surface defines how its points are drawn. Points of spheres, tori, triangles and outlines are drawn directly. Any
+other wall is a quadric or a plane: lines that are uniform and isotropic in a ball, or in a plane in a disc, meet every
+piece of an area equally often (Crofton), at any orientation of the piece.
 """
 
 import functools
@@ -22,16 +22,16 @@ Region = tuple[Floats, Floats]
 Draw = Callable[[Random, int], Floats]
 
 
-# A point that is drawn is as near to its surface as this part of the extent of the surface.
+# A drawn point is as near to its surface as this part of the extent of the surface.
 NEAR = 1e-10
 
 
 class AreaSample(NamedTuple):
-    """A part of a surface.
+    """A sampler of a part of a surface.
 
     Attributes:
-        area: of what is sampled. Points of several samples are uniform in all if they are as many as their areas say.
-        draw: a function that draws so many points (3, n), NaN where a line meets nothing.
+        area: area of the part. Points of several samples are uniform in all if their numbers are as the areas.
+        draw: function that draws points (3, n) from a random generator and n, NaN where a line meets nothing.
     """
 
     area: float
@@ -39,7 +39,7 @@ class AreaSample(NamedTuple):
 
 
 def points_of(samples: list[AreaSample], random: Random, n: int) -> Floats:
-    """At most so many points of some samples, uniform in their areas, in random order."""
+    """Return at most `n` points of the samples, uniform in their areas, in random order."""
     areas = np.array([one.area for one in samples])
     counts = random.multinomial(n, areas / areas.sum()) if len(samples) > 1 else np.array([n])
     drawn = [one.draw(random, int(count)) for one, count in zip(samples, counts, strict=True) if count]
@@ -50,13 +50,13 @@ def points_of(samples: list[AreaSample], random: Random, n: int) -> Floats:
 
 
 def directions(random: Random, n: int) -> Floats:
-    """Unit vectors uniform on the sphere, (3, n)."""
+    """Return unit vectors (3, n) uniform on the sphere."""
     normal = random.standard_normal((3, n))
     return np.asarray(normal / np.sqrt((normal**2).sum(axis=0)))
 
 
 def of_triangles(vertices: Floats, triangles: NDArray[Any]) -> AreaSample:
-    """The sample of triangles (T, 3) with these corners (V, 3)."""
+    """Return the sample of triangles (T, 3) with vertices (V, 3)."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     areas = 0.5 * np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1))
 
@@ -74,7 +74,7 @@ def of_triangles(vertices: Floats, triangles: NDArray[Any]) -> AreaSample:
 
 
 def by_lines(surface: Any, bounds: Region, across: int | None) -> Iterator[AreaSample]:
-    """The samples of a surface with walls of the second degree at most."""
+    """Yield the samples of a surface with walls of at most the second degree."""
     low, high = (np.array(corner, np.float64) for corner in surface.enclosing_box())
     low, high = np.maximum(low, bounds[0]), np.minimum(high, bounds[1])
     if not np.isfinite(high - low).all():
@@ -97,7 +97,7 @@ def by_lines(surface: Any, bounds: Region, across: int | None) -> Iterator[AreaS
 
 
 def _met(wall: Any, ball: tuple[Floats, float, int | None], random: Random, n: int) -> Floats:
-    """Where random lines through a ball, or a disc, meet a wall; of two places on a line one at random."""
+    """Return where random lines through a ball, or a disc, meet a wall; one of two places on a line at random."""
     center, radius, across = ball
     first, u = _lines(random, n, across)
     foot = center + radius * first
@@ -110,7 +110,7 @@ def _met(wall: Any, ball: tuple[Floats, float, int | None], random: Random, n: i
         sign = np.where(random.random(n) < 0.5, 1.0, -1.0)
         with np.errstate(all="ignore"):
             root = np.sqrt(b * b - 4.0 * a * here)
-            # The one that is not a difference, and the other one by the product of both.
+            # The root that is not a difference, and the other root by the product of both.
             large = -0.5 * (b + np.copysign(root, b))
             size = np.abs(here) + np.abs(b) + np.abs(a)
             t = np.where(sign > 0.0, large / np.where(np.abs(a) > 1e-13 * size, a, np.nan), here / large)
@@ -118,7 +118,7 @@ def _met(wall: Any, ball: tuple[Floats, float, int | None], random: Random, n: i
 
 
 def _lines(random: Random, n: int, across: int | None) -> tuple[Floats, Floats]:
-    """Feet and directions of lines that are uniform and isotropic among those that meet the unit ball, or disc."""
+    """Return feet and directions of uniform, isotropic lines among those that meet the unit ball, or disc."""
     if across is not None:
         angle, offset = 2.0 * math.pi * random.random(n), 2.0 * random.random(n) - 1.0
         i, j = (across + 1) % 3, (across + 2) % 3

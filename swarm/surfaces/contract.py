@@ -1,13 +1,13 @@
-"""The contract of a surface: every function that kernels ask of one, required or derived, with its definition.
+"""The contract of a surface: the functions that kernels call, required or derived, with their definitions.
 
-A surface is an implicit function phi(r): below 0 inside, 0 on it, above 0 outside. What kernels take of it is a record,
-derived from `Smooth`. Its field `side` is +1 for a cavity (phi <= 0 is admissible) and -1 for a solid (phi >= 0). The
+A surface is an implicit function phi(r): below 0 inside, 0 on it, above 0 outside. Kernels take it as a record derived
+from `Smooth`. Its field `side` is +1 for a cavity (phi <= 0 is admissible) and -1 for a solid (phi >= 0). The
 *gap* is g = side phi, admissible where g <= 0.
 
 phi is a function of a smooth inner function q(r), phi = phi(q(r)). A divided difference times a discrete gradient of
 q is then a discrete gradient of anything built on phi (the composite gradient), even where the penalty has a corner.
 
-`required.py` says in one sentence, before anything is compiled, what a surface lacks for a method.
+`required.py` names the methods that a surface lacks for a method of simulation, before anything is compiled.
 """
 
 from typing import Any, NamedTuple
@@ -22,12 +22,12 @@ from .time_of_impact import march
 from .time_of_impact.approach import Approach
 from .time_of_impact.course import Fall, close, first_rise, rise_near, rise_time, safe_rise_time
 
-# Newton steps of the chord.
+# The most Newton steps of the chord.
 _CHORD_SWEEPS = 50
 
 
 class Bent(NamedTuple):
-    """What safe steps need at a place: grad q, the level, the three `hessian_bounds` and the `clearance`."""
+    """The quantities at a place for safe steps: grad q, the level, the three `hessian_bounds` and the `clearance`."""
 
     n: Vec
     level: Any
@@ -38,7 +38,7 @@ class Bent(NamedTuple):
 
 
 class Smooth(AtRest):
-    """A surface as kernels take it.
+    """The record of a surface for kernels.
 
     Required are the field `side`, the methods `phi` and `gradient`, and one that finds the first hit of a flight:
         first_hit (and falling_hit under gravity)  in closed form,
@@ -51,7 +51,7 @@ class Smooth(AtRest):
     for motion that is not uniform one of these, from which safe steps in the frame of the wall follow, rising.py:
         level_along  the level with a bound of its third derivative, which gives the longest steps,
         hessian_bounds.
-    Everything else has a definition here, which a surface overrides only where that is faster or more exact. A surface
+    Everything else is defined here, and a surface overrides it only where that is faster or more exact. A surface
     with an inner function other than phi overrides all of `inner`, `inner_gradient`, `gap_of`, `level_of` and
     `gap_slope`. Attributes that are no methods are constants for the compiler.
     """
@@ -64,31 +64,31 @@ class Smooth(AtRest):
     # --- Required: the level set ---
 
     def phi(self, r):
-        """The implicit function at one point (or, in Python, at arrays of points)."""
+        """Return the implicit function at one point (or, in Python, at arrays of points)."""
         raise NotImplementedError
 
     def gradient(self, r):
-        """Gradient of phi."""
+        """Return the gradient of phi."""
         raise NotImplementedError
 
     def hessian(self, r):
-        """H = grad grad q/2, a `Symmetric`; steps in contact that have no closed form need it."""
+        """Return H = grad grad q/2, a `Symmetric`; steps in contact without a closed form need it."""
         raise NotImplementedError
 
     def step_bend(self, r0, d):
-        """H for a step from r0 by d: at the midpoint of the step."""
+        """Return H at the midpoint of a step from r0 by d."""
         return self.hessian(r0 + 0.5 * d)
 
     def hessian_bounds(self, r):
-        """Bounds of the eigenvalues of side H near r: (most, magnitude, reach).
+        """Return bounds of the eigenvalues of side H near r: (most, magnitude, reach).
 
         Within the distance `reach` of r no eigenvalue exceeds `most`, and none is larger in magnitude than `magnitude`.
-        The distance must be finite where the hits of falls follow from these.
+        The distance must be finite where the hits of falls follow from these bounds.
         """
         raise NotImplementedError
 
     def farthest_push(self):
-        """The kappa of the first pole of `push`: above 0 for a cavity, below 0 for a solid; infinite without one."""
+        """Return kappa at the first pole of `push`: above 0 for a cavity, below 0 for a solid; infinite without one."""
         raise NotImplementedError
 
     # --- The inner function and the gap ---
@@ -110,7 +110,7 @@ class Smooth(AtRest):
         return self.side * q
 
     def level_of(self, q):
-        """A number of the same sign as the gap, for decisions; cheaper where the gap takes a square root."""
+        """A number of the same sign as the gap, for decisions; cheaper than a gap with a square root."""
         return self.gap_of(q)
 
     def gap_slope(self, q0, q1):
@@ -134,17 +134,17 @@ class Smooth(AtRest):
         return n * (self.side / norm(n))
 
     def project(self, r):
-        """The point on the surface next to one within round-off of it: one Newton step along the gradient."""
+        """Project a point within round-off of the surface onto it: one Newton step along the gradient."""
         n = self.gradient(r)
         return r - (self.phi(r) / square(n)) * n
 
-    # --- Of sources and counters, in Python ---
+    # --- For sources and counters, in Python ---
 
-    # The degree of a polynomial that vanishes on the wall and nowhere else; 0: there is no such polynomial.
+    # The degree of a polynomial that vanishes on the wall and nowhere else; 0 without such a polynomial.
     degree = 0
 
     def polynomial(self, r):
-        """The values of that polynomial at points."""
+        """Return the values of this polynomial at points."""
         return self.phi(r)
 
     def smooth_parts(self):
@@ -152,14 +152,14 @@ class Smooth(AtRest):
         return (self,)
 
     def reversible(self):
-        """A record of the wall that differs between its two sides by the sign of `side` alone; None if it has none."""
+        """A record of the wall that differs between its two sides by the sign of `side` alone, or None."""
 
-    # --- Of balls ---
+    # --- For balls ---
 
     def grown(self, radius):
-        """The wall that the centre of a ball meets: the parallel surface, so far on the admissible side.
+        """The wall that the centre of a ball meets: the parallel surface at `radius` on the admissible side.
 
-        Returns a record with an exact `distance`. The radius is 0 or more, and no constant for the compiler.
+        Return a record with an exact `distance`. The radius is 0 or more, and no constant for the compiler.
         """
         raise NotImplementedError
 
@@ -171,12 +171,12 @@ class Smooth(AtRest):
     # --- Flight ---
 
     def first_hit(self, r, v):
-        """When the straight flight r + v t leaves the admissible side: (time, whether it does then).
+        """When the straight flight r + v t leaves the admissible side: (time, whether it leaves then).
 
-        Where the second is False, the flight surely stays admissible until that time and has to be searched further
-        from there. An infinite time means never. A particle on the surface that moves inward does not hit it at time 0:
-        the sign of the approach decides, not an epsilon. At a point outside by round-off the time is 0 if the particle
-        moves outward.
+        If the second is False, the flight surely stays admissible until that time, and the search continues from there.
+        An infinite time means never. A particle on the surface that moves inward does not hit it at time 0: the sign of
+        the approach decides, not a tolerance. At a point outside by round-off the time is 0 if the particle moves
+        outward.
         """
         return self.hit_by_steps(None, r, v)
 
@@ -194,9 +194,9 @@ class Smooth(AtRest):
         return march.march(self, r, v, ZERO if gravity is None else as_vector(gravity))
 
     def steps(self, gravity, r, v):
-        """The safe steps of a flight to the wall, for lanes: a `Fall`, an `Approach` or the like.
+        """Return the safe steps of a flight to the wall, for lanes: a `Fall`, an `Approach` or the like.
 
-        None where the hit is found in one call.
+        None where one call finds the hit.
         """
         if gravity is not None and self.is_quartic:
             level = self.course(r, v, as_vector(gravity))
@@ -205,11 +205,11 @@ class Smooth(AtRest):
         return Approach(self, gravity, r, v) if near else None
 
     def look(self, r, v, pull, t, is_first):
-        """The `SafeStep` of march.py from the place of a flight at the time t."""
+        """Return the `SafeStep` of march.py from the place of a flight at the time t."""
         return march.look(self, r, v, pull, t, is_first)
 
     def bent(self, r):
-        """The `Bent` of a place, from which safe steps follow."""
+        """Return the `Bent` of a place, from which safe steps follow."""
         n, level = self.inner_gradient(r), self.level_of(self.inner(r))
         most, magnitude, reach = self.hessian_bounds(r)
         return Bent(n, level, most, magnitude, reach, self.clearance(r))
@@ -218,9 +218,9 @@ class Smooth(AtRest):
     falling_looks = march.FALLING_LOOKS
 
     def safe_time(self, r, v, pull):
-        """A time during which that parabola surely stays admissible: a cheap lower bound of the hit.
+        """A time during which this parabola surely stays admissible: a cheap lower bound of the time of the hit.
 
-        It is 0 where no bound is known: then a method takes every one of its steps.
+        It is 0 where no bound is known: then a method takes each of its steps.
         """
         if self.is_quartic:
             return safe_rise_time(self.course(r, v, pull))
@@ -232,7 +232,7 @@ class Smooth(AtRest):
     def entry(self, gravity, r, v):
         """A time until which a flight surely stays admissible: (time, whether it leaves the admissible side then).
 
-        Solids ask this of their parts, and ask all of them again at that time: so it may be earlier than the hit.
+        Solids call it for their parts, and call it for all of them again at that time: so it may be before the hit.
         """
         if gravity is None:
             return self.first_hit(r, v)
@@ -244,7 +244,7 @@ class Smooth(AtRest):
         return self.first_hit(r0, r1 - r0)
 
     def course(self, r, v, pull):
-        """The level along that parabola as a `Quartic`."""
+        """The level along this parabola as a `Quartic`."""
         raise NotImplementedError
 
     @property
@@ -252,16 +252,16 @@ class Smooth(AtRest):
         """Whether the surface has a `course`."""
         return self.gives("course")
 
-    # Whether its `course` may be one from afar.
+    # Whether `course` may return a quartic for a start from afar.
     may_be_far = True
 
-    # The number of numbers of a `PolynomialFlight`, made by `flight`, that lanes keep for a straight flight; 0: none.
+    # How many numbers of a `PolynomialFlight`, made by `flight`, lanes keep for a straight flight; 0: no such flight.
     kept = 0
-    # Whether its steps begin with a guess of the root.
+    # Whether the steps begin with a guess of the root.
     aims = False
-    # The number of powers of a `fall` that lanes keep for a guess of its root; 0: falls begin without a guess.
+    # How many powers of a `fall` lanes keep for a guess of its root; 0: falls begin without a guess.
     fall_powers = 0
-    # Whether its steps are those of `FlightByLooks`.
+    # Whether the steps are those of `FlightByLooks`.
     looked_at = False
 
     def fall(self, gravity, r, v):
@@ -269,13 +269,13 @@ class Smooth(AtRest):
         raise NotImplementedError
 
     def refined(self, gravity, r, v, time):
-        """The time that these steps have found, corrected by the level there: that at r has the round-off of r."""
+        """Return the time from these steps, corrected by the level there: the level at r has the round-off of r."""
         raise NotImplementedError
 
     def near(self, gravity, r, v):
-        """A polynomial of time that is nowhere below the level of a flight from r on, and equals it at r.
+        """Return a polynomial of time, nowhere below the level of a flight from r on, and equal to it at r.
 
-        Returns a `LevelBound` of approach.py. The gravity of a straight flight is None.
+        The result is a `LevelBound` of approach.py. The gravity of a straight flight is None.
         """
         raise NotImplementedError
 
@@ -293,7 +293,7 @@ class Smooth(AtRest):
         return self.clearance(r)
 
     def far(self, r):
-        """Lower bound of the distance to the wall: `clearance`, also in a frame, and of the parts of a solid."""
+        """Lower bound of the distance to the wall: `clearance`, but also in a frame, and for parts of a solid."""
         return self.clearance(r)
 
     def reach(self, lease):
@@ -306,7 +306,7 @@ class Smooth(AtRest):
         """Whether a solid may have a point in common with the box between these corners, which its bounds overlap."""
         return True
 
-    # Whether `first_hit` of a straight flight that starts outside and comes in is the time at which it leaves again.
+    # Whether `first_hit` of a straight flight that starts outside and enters is the time at which it leaves again.
     leaves_once = False
 
     def passed(self, r, v):
@@ -329,7 +329,7 @@ class Smooth(AtRest):
     # --- Contact: a step r1 = r0 + p - kappa D(r0, r1) with the free displacement p = h v0 + h^2 G/2 ---
 
     def mean_gradient(self, r0, r1):
-        """What a discrete gradient corrects: grad q(m) of the midpoint m, or another mean to second order."""
+        """The mean that a discrete gradient corrects: grad q(m) of the midpoint m, or another mean to second order."""
         return self.inner_gradient(0.5 * (r0 + r1))
 
     def discrete_gradient(self, r0, r1):
@@ -347,31 +347,31 @@ class Smooth(AtRest):
         return slope * self.discrete_gradient(r0, r1)
 
     def resting_gradient(self, r0, r1):
-        """The discrete gradient, but grad q(m) where that satisfies D.(r1 - r0) = q1 - q0 up to round-off.
+        """The discrete gradient, or grad q(m) where this satisfies D.(r1 - r0) = q1 - q0 up to round-off.
 
-        Divided by |d| that round-off is noise in short steps, which would keep balls from coming to rest.
+        Divided by |d|, round-off is noise in short steps, and it would keep balls from coming to rest.
         """
         if self.gives("discrete_gradient"):
             return self.discrete_gradient(r0, r1)
         g, d = self.mean_gradient(r0, r1), r1 - r0
         d2, rest = square(d), self.difference(r0, r1) - dot(g, d)
         noise = IDENTITY * total(times(absolute(g), absolute(r0) + absolute(r1)))
-        # All of it from twice the noise on, without a jump.
+        # The full correction from twice the noise on, without a jump.
         over = select(rest > 0.0, 1.0, -1.0) * 2.0 * (abs(rest) - noise)
         rest = select(abs(rest) < 2.0 * noise, select(abs(rest) > noise, over, 0.0), rest)
         return g + (rest / select(d2 > 0.0, d2, 1.0)) * d
 
     def step_normal(self, r0, r1):
-        """The unit vector along that discrete gradient, out of the admissible side."""
+        """The unit vector along the discrete gradient, out of the admissible side."""
         n = self.discrete_gradient(r0, r1)
         return n * (self.side / norm(n))
 
     def push(self, r0, p, kappa):
-        """The end r1 of the step."""
+        """Return the end r1 of the step."""
         return newton.push(self, r0, p, kappa)
 
     def rise(self, r0, p, kappa):
-        """q1 - q0 = D.(r1 - r0) of the step, without cancellation, and its derivative by kappa."""
+        """Return q1 - q0 = D.(r1 - r0) of the step, without cancellation, and its derivative by kappa."""
         return newton.rise(self, r0, p, kappa)
 
     def free_rise(self, r0, p):
@@ -379,23 +379,23 @@ class Smooth(AtRest):
         return self.rise(r0, p, 0.0)
 
     def turned_push(self, r0, p, kappa, tilt):
-        """The end of r1 = r0 + p - kappa (D - tilt x D), the step of a wall that turns: see in_motion/turned.py."""
+        """Return the end of r1 = r0 + p - kappa (D - tilt x D), the step of a wall that turns: in_motion/turned.py."""
         return newton.push(self, r0, p, kappa, tilt)
 
     def turned_rise(self, r0, p, kappa, tilt):
-        """`rise` of that step."""
+        """`rise` of the step of a wall that turns."""
         return newton.rise(self, r0, p, kappa, tilt)
 
     def resolve(self, r, strength):
-        """The point s with s + strength grad q(s) = r, for the mean-value form."""
+        """Return the point s with s + strength grad q(s) = r, for the mean-value form."""
         return newton.resolve(self, r, strength)
 
     def chord_guess(self, r, p):
-        """First guess of the kappa for which a step from the surface ends on it; exact if `chord_sweeps` is 0."""
+        """First guess of kappa, for which a step from the surface ends on it; exact if `chord_sweeps` is 0."""
         return -self.chord_improve(r, p, 0.0)
 
     def chord_improve(self, r, p, kappa):
-        """The Newton step of that kappa: subtract it."""
+        """Return the Newton step of this kappa, to be subtracted."""
         risen, steepness = self.rise(r, p, kappa)
         return risen / steepness
 
@@ -403,7 +403,7 @@ class Smooth(AtRest):
     chord_sweeps = _CHORD_SWEEPS
 
     def chord_normal(self, r, p, kappa):
-        """Unit normal of that step, parallel to D(r0, r1), out of the admissible side; `unit_normal` for p = 0."""
+        """Unit normal of this step, parallel to D(r0, r1), out of the admissible side; `unit_normal` for p = 0."""
         # The derivative of `rise` is exact for short steps only: there the sweeps gain a constant factor each, and stop
         # with up to 1e-10 of kappa to go. Without one more step the chord of a sampled wall ends 240 eps off it.
         kappa = kappa - self.chord_improve(r, p, kappa)

@@ -1,4 +1,4 @@
-"""Counters as kernels take them: when a flight crosses one, and on which side of it a place is."""
+"""Counters in kernels: when a flight crosses one, and on which side of it a place is."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -16,22 +16,22 @@ from .walls import penetration
 
 
 class Counted(Record):
-    """A counter. Its `sign` is 1 of a particle on its admissible side, -1 of one on the other."""
+    """A counter. A particle on its admissible side has the `sign` 1, and on its other side -1."""
 
     if TYPE_CHECKING:
         near: Any
         volumes: Any
 
     def may_cross(self, sign, gravity, r, v, span):
-        """Whether a flight may cross it within a time, without a branch."""
+        """Whether a flight may cross the counter within the time `span`, without a branch."""
         raise NotImplementedError
 
     def crossing(self, sign, gravity, r, v):
-        """The first `Hit` of a flight with a wall of the counter."""
+        """Return the first `Hit` of a flight with a wall of the counter."""
         raise NotImplementedError
 
     def may_cross_again(self, sign, gravity, r, v, span):
-        """The same of a flight from it, into the side of the sign."""
+        """Whether a flight from the counter, into the side of the sign, may cross it within the time `span`."""
         return True
 
     def distance(self, r):
@@ -39,11 +39,11 @@ class Counted(Record):
         raise NotImplementedError
 
     def is_near(self, r):
-        """Whether a place is on it, within round-off."""
+        """Whether a place is on the counter, within round-off."""
         return abs(self.distance(r)) <= self.near
 
     def speed(self, sign, wall, r, v):
-        """The speed across a wall at a place on it."""
+        """Speed across a wall of the counter at a place on it."""
         raise NotImplementedError
 
     def has(self, r):
@@ -52,11 +52,11 @@ class Counted(Record):
 
 
 class ReversedCounter(Counted):
-    """A counter of one wall that is the same from its other side when its sign is changed."""
+    """A counter of one wall that a change of its sign turns to its other side."""
 
     wall: Any
     near: float  # a distance that is round-off [m]
-    volumes: Any  # None, or those in which crossings count
+    volumes: Any  # None, or the volumes in which crossings count
 
     def may_cross(self, sign, gravity, r, v, span):
         wall = with_sign(self.wall, sign)
@@ -79,7 +79,7 @@ class ReversedCounter(Counted):
         return self.wall.distance(r)
 
     def is_near(self, r):
-        # The same without a root and a division
+        # Without the root and the division of a distance
         level = self.wall.level_of(self.wall.inner(r))
         return level * level <= (self.near * self.near) * square(self.wall.inner_gradient(r))
 
@@ -94,13 +94,13 @@ class ReversedCounter(Counted):
 
 
 class Walled(Counted):
-    """Any counter: the walls that hold what is on its admissible side, and those of the other one."""
+    """Any counter: the walls around its admissible side, and the walls around its other side."""
 
     inner: Any
     outer: Any
     near: float  # a distance that is round-off [m]
-    volumes: Any  # None, or those in which crossings count
-    ball: Any  # None, or a solid ball that the surface is in
+    volumes: Any  # None, or the volumes in which crossings count
+    ball: Any  # None, or a solid ball that contains the surface
 
     def may_cross(self, sign, gravity, r, v, span):
         found = span > 0.0
@@ -125,7 +125,7 @@ class Walled(Counted):
 
 
 def _may_meet(ball, gravity, r, v, span):
-    """Whether a flight is in a ball within a time."""
+    """Whether a flight may be in a ball within the time `span`."""
     if gravity is not None:
         return _may_rise(ball.course(r, v, as_vector(gravity)), span)
     time, _found = ball.first_hit(r, v)
@@ -133,17 +133,17 @@ def _may_meet(ball, gravity, r, v, span):
 
 
 def _may_rise(level, span):
-    """Whether the level of a fall may be above 0 within a time."""
+    """Whether the level of a fall may be above 0 within the time `span`."""
     return _are_some_above(bernstein((level.c, 2.0 * level.b, level.a2, level.a3, level.a4), span))
 
 
 def _may_rise_again(level, span):
-    """The same of a flight from the level 0 inwards, by what is left of the level over the time."""
+    """Whether the level of a fall inwards from the level 0 may be above 0 again, by the level over the time."""
     return _are_some_above(bernstein((2.0 * level.b, level.a2, level.a3, level.a4), span))
 
 
 def _are_some_above(whole):
-    """Whether any Bernstein coefficient of a quarter of an interval is not below 0, from those of the whole one."""
+    """Whether any Bernstein coefficient of a quarter of the `whole` interval is not below 0."""
     found = False
     for half in _halves(whole):
         for quarter in _halves(half):
@@ -153,7 +153,7 @@ def _are_some_above(whole):
 
 
 def _halves(coefficients):
-    """Those of both halves of an interval, by de Casteljau's scheme."""
+    """Bernstein coefficients of both halves of an interval, by de Casteljau's scheme."""
     if len(coefficients) == 1:
         return coefficients, coefficients
     means = tuple(0.5 * (a + b) for a, b in zip(coefficients[:-1], coefficients[1:], strict=True))  # noqa: RUF007  traced
@@ -162,7 +162,7 @@ def _halves(coefficients):
 
 
 def _soonest(walls, r, v):
-    """When a straight flight leaves walls, or before that: where it has no closed form at once."""
+    """Lower bound of the time at which a straight flight leaves walls; 0 where it has no closed form."""
     return flights.first_hit(walls, None, r, v).time if _are_simple(walls) else 0.0
 
 
@@ -176,7 +176,7 @@ def _are_simple(walls):
 
 
 def with_sign(wall, sign):
-    """A wall, seen from its other side where the sign is -1."""
+    """Return a wall, seen from its other side where the sign is -1."""
     if isinstance(wall, Framed):
         return wall._replace(body=with_sign(wall.body, sign))
     if isinstance(wall, PlaneNumbers):
@@ -189,7 +189,7 @@ _GRAZING = 1e-9
 
 
 def slowness(across, v):
-    """1/(the speed across a counter) [s/m], of a particle with this velocity."""
+    """1/(the speed across a counter) [s/m] of a particle with the velocity v."""
     speed = total(absolute(v))
     least = select(speed > 0.0, _GRAZING * speed, math.inf)
     return 1.0 / select(across > least, across, least)

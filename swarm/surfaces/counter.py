@@ -1,4 +1,4 @@
-"""Counters: surfaces that stop no particle and count crossings, as users describe them."""
+"""Counters, as users describe them: surfaces that stop no particle and count crossings."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -13,15 +13,15 @@ class Counter:
     """A surface that stops no particle and counts crossings; an entry of the argument `counters` of `simulate`.
 
     Crossings have two senses: 0 is out of the admissible side of the surface (along the normal of a plane, out of a
-    sphere), 1 is back. A surface by itself is a counter as well: this says where on it crossings count.
+    sphere), 1 is back. A surface alone is a counter as well; a `Counter` limits the places where crossings count.
 
     Args:
         surface: any surface at rest without laws, openings and `present`, but no `Mesh` and no `Prism`.
-        inside: None: all crossings count. Else a volume, a surface as an opening is: those within it do, as at the
-            mouth of a tube.
+        inside: a volume, described by a surface as an opening is: only crossings within it count, as at the mouth of a
+            tube. None: all crossings count.
 
     Raises:
-        SceneError: what is given is no such surface.
+        SceneError: an argument is no such surface.
 
     >>> import swarm
     >>> cavity = swarm.Scene([swarm.Sphere(radius=0.5)])
@@ -42,7 +42,7 @@ class Counter:
 
 
 def require_bare(name: str, given: Any, why: str) -> None:
-    """Raise a `SceneError` unless this is a surface with nothing that a wall has besides its place."""
+    """Raise a `SceneError` unless `given` is a surface with arguments for its shape and place only."""
     if not isinstance(given, Surface):
         raise SceneError(f"{name} must be a surface such as swarm.Plane, got {shown(given)}")
     for law in fields(Surface):
@@ -52,7 +52,7 @@ def require_bare(name: str, given: Any, why: str) -> None:
 
 
 def checked_counters(name: str, value: Any) -> tuple[Counter, ...]:
-    """The argument `counters`: each as a `Counter`."""
+    """Return the argument `counters`, checked, each as a `Counter`."""
     given = list_of(name, value, "surfaces such as swarm.Plane", Surface, Counter)
     found = []
     for k, one in enumerate(given):

@@ -1,4 +1,4 @@
-"""Matrices of second derivatives, and how a surface without a Hessian bends, by central differences."""
+"""Matrices of second derivatives, and the curvature of a surface without a Hessian by central differences."""
 
 import math
 
@@ -7,10 +7,10 @@ from ..kernel.limits import TINY
 from ..kernel.vector import Symmetric, Vec, dot, square
 from ..state import Floats
 
-# The part of a length for a difference, the cube root of round-off: the error of the difference and that of its
-# terms are alike.
+# The length of a difference as a part of a length of the surface, the cube root of round-off: the truncation error
+# of the difference and the round-off of its terms are alike.
 SPACING = 6e-6
-# Of the entries of a `Symmetric`, those that are the rows of the matrix.
+# The entries of a `Symmetric` in the order of the rows of the matrix.
 _ROWS = [0, 3, 5, 3, 1, 4, 5, 4, 2]
 
 
@@ -36,7 +36,7 @@ def applied(a, v):
 
 
 def half_hessian(wall, r, h, sign=1.0):
-    """sign grad grad phi/2, by differences over h to both sides."""
+    """Return sign grad grad phi/2, by central differences with the spacing h."""
     f = 0.25 * sign / h
     x, y = _turn(wall, r, Vec(h, 0.0, 0.0), f), _turn(wall, r, Vec(0.0, h, 0.0), f)
     z = _turn(wall, r, Vec(0.0, 0.0, h), f)
@@ -50,7 +50,7 @@ def _turn(wall, r, step, f):
 def outward_acceleration(wall, r, v, pull):
     """The second derivative of the distance outside of a wall along a free flight [m/s^2]."""
     speed2 = square(v)
-    # So much of the scale of places of the wall that its normal turns little on the way.
+    # A part of the scale of places at which the normal of the wall turns little on the way.
     step = SPACING * wall.gap_scale(r)
     time = step / math.sqrt(select(speed2 > 0.0, speed2, 1.0))
     turned = wall.unit_normal(r + time * v) - wall.unit_normal(r - time * v)

@@ -1,23 +1,23 @@
-"""A surface in a frame of its own: what is asked of it is asked of its body there.
+"""A surface in a frame of its own: calls are forwarded to its body in that frame.
 
-Each argument of the contract has a role, by which it goes into the frame, and each answer one by which it comes out: a
-place, a velocity and any other vector are turned, a place is moved too, in a wall that moves a velocity loses that of
-the wall, and a number is the same in any frame. Over a step the wall may be elsewhere at its end: that is the place
-`end`, the free displacement is a `way`, and the `normal` of the step is turned to both.
+Each argument of the contract has a role that says how it is transformed into the frame, and each result one that says
+how it is transformed out of it. Places, velocities and other vectors are turned; a place is also moved; in a wall that
+moves a velocity loses that of the wall; a number is the same in any frame. At the end of a step the wall may be at
+another place: this end has the role `end`, the free displacement `way`, and the `normal` of the step is turned to both.
 """
 
 from typing import Any
 
 from .contract import Smooth
 
-# The roles of the arguments and of the answer, and what is asked with these.
+# The roles of the arguments and of the result, and the methods with these roles.
 _FORWARDED: tuple[tuple[tuple[str | None, ...], str | None, tuple[str, ...]], ...] = (
     ((None,), None, ("gap_of", "level_of")),
     ((None, None), None, ("gap_slope",)),
     (("place",), None, ("phi", "polynomial", "inner", "distance", "gap_scale", "out_of", "far")),
     (("place",), "vector", ("gradient", "inner_gradient", "unit_normal")),
     (("place",), "place", ("project",)),
-    # Of a flight
+    # For a flight
     (("place", "velocity"), None, ("first_hit",)),
     (("place", "velocity", "vector"), None, ("falling_hit", "safe_time", "course", "outward_acceleration")),
     (("gravity", "place", "velocity"), None, ("steps", "fall", "entry")),
@@ -26,7 +26,7 @@ _FORWARDED: tuple[tuple[tuple[str | None, ...], str | None, tuple[str, ...]], ..
     (("seen",), None, ("level_along",)),
     (("seen", None), None, ("moving_step",)),
     (("place", "velocity", "swings"), None, ("passage",)),
-    # Of a step
+    # For a step
     ((), None, ("farthest_push",)),
     (("end",), None, ("end_inner",)),
     (("place", "end"), "normal", ("discrete_gradient", "gap_gradient", "resting_gradient", "step_normal")),
@@ -37,7 +37,7 @@ _FORWARDED: tuple[tuple[tuple[str | None, ...], str | None, tuple[str, ...]], ..
     (("place", "way", None, "vector"), None, ("turned_rise",)),
     (("place", "way", None, "vector"), "end", ("turned_push",)),
     (("place", None), "place", ("resolve",)),
-    # Of a field: see `Members`
+    # For a field: see `Members`
     ((), None, ("count",)),
     ((None, None), None, ("goes_on",)),
     (("place",), None, ("count_in_cell", "deepest_in_cell")),
@@ -70,10 +70,10 @@ _CONSTANTS = (
 
 
 class Framed(Smooth):
-    """A surface `body`, asked in its own frame.
+    """A surface `body` in a frame of its own.
 
-    A class of frames gives the ways in, such as `place_in`, and out, as far as its surfaces are asked, and overrides
-    what depends on more than its arguments.
+    A class of frames defines the transformations into the frame, such as `place_in`, and out of it, as far as they are
+    needed, and overrides the methods that depend on more than their arguments.
     """
 
     def grown(self, radius):
@@ -84,14 +84,14 @@ class Framed(Smooth):
         return None if body is None else self._replace(body=body)
 
     def seen_in(self, seen):
-        """A particle as the wall sees it, in the frame of the body."""
+        """Return a particle relative to the wall, in the frame of the body."""
         return self._flight_in(seen)
 
     def _flight_in(self, flight):
         return flight._replace(r=self.place_in(flight.r), v=self.vector_in(flight.v), a=self.vector_in(flight.a))
 
     def lease_in(self, lease):
-        """A `Lease` in the frame of the body."""
+        """Return a `Lease` in the frame of the body."""
         return self._flight_in(lease)._replace(axis=None if lease.axis is None else self.vector_in(lease.axis))
 
 
@@ -115,7 +115,7 @@ for _name in _CONSTANTS:
 
 
 class Unturned(Framed):
-    """A surface in the frame of its body: each way in and out is the identity. Subclasses change what is answered."""
+    """A surface in the frame of its body: transformations are the identity. Subclasses change results."""
 
     def flat_normal(self):
         return self.body.flat_normal()

@@ -16,10 +16,10 @@ from .surface import SIDES, Box, HalfSpace, Surface
 # The search for an admissible point: number of starts, and moves of each onto the surface that it violates most.
 _STARTS = 512
 _MOVES = 30
-# Then this many of the nearest are moved onto all surfaces that they violate together.
+# Then this number of the nearest points is moved onto all surfaces that they violate together.
 _NEAREST = 32
 _STEPS = 100
-# Each move aims this far, relative to the gap: a little past the surface, so that thin volumes are hit.
+# Each move aims at this multiple of the gap: a little past the surface, so that thin volumes are hit.
 _PAST = 1.05
 
 
@@ -54,7 +54,7 @@ def gradient_of(images: Sequence[Surface], points: NDArray[np.float64]) -> NDArr
 
 
 def box_of(surface: Surface, time: float, filled: bool = False) -> Box:
-    """The bounds of a surface at a time [s], or the box around what is `filled` by it, a solid too."""
+    """Return the bounds of a surface at a time [s], or the box around the volume that it encloses, if `filled`."""
     low, high = (np.array(corner) for corner in (surface.enclosing_box() if filled else surface.bounds()))
     if surface.motion is not None:
         found = motions.pose(surface.motion, time)
@@ -70,7 +70,7 @@ def box_of(surface: Surface, time: float, filled: bool = False) -> Box:
 
 
 def planes_of(surface: Surface, planes: list[HalfSpace], time: float) -> list[HalfSpace]:
-    """Half-spaces of a surface at a time [s]."""
+    """Return the half-spaces of a surface at a time [s]."""
     if surface.motion is None or not planes:
         return planes
     found = motions.pose(surface.motion, time)
@@ -87,8 +87,8 @@ def has_room(
     Args:
         low: lowest corner of the box (3, 1) [m].
         high: highest corner.
-        gaps: those of every surface at points (3, N), shape (surfaces, N).
-        gradient: of the gap of surface i at points (3, N), shape (3, N).
+        gaps: function that returns the gaps of all surfaces at points (3, N), shape (surfaces, N).
+        gradient: function that returns the gradient of the gap of surface i at points (3, N), shape (3, N).
     """
     points = low + (high - low) * np.random.default_rng(0).random((3, _STARTS))
     for _ in range(_MOVES):
@@ -114,7 +114,7 @@ def has_room(
         near = found > -worst
         normals = (gradients / lengths[:, None] * near[:, None]).transpose(2, 0, 1)
         wanted = ((found + (_PAST - 1.0) * worst) * near).T[:, :, None]
-        # Where normals are all but parallel and the volumes are apart, the step leads far away.
+        # Where normals are nearly parallel and the volumes are apart, the step leads far away.
         points = np.clip(points - (np.linalg.pinv(normals) @ wanted)[:, :, 0].T, 2.0 * low - high, 2.0 * high - low)
     return False
 

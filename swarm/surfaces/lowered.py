@@ -1,6 +1,6 @@
-"""Walls as a contact step takes them: of a field the member that is met, of a union the room, and lowered if centred.
+"""Walls in a contact step: a member for its field, a room for its union, and lowered if the step is centred.
 
-A centred step begins in State I, on the level surface of phi through its start, and ends on it: there the gap is 0.
+A centred step begins in State I, on the level surface of phi through its start, and ends on it: the gap is 0 there.
 """
 
 from typing import Any
@@ -19,7 +19,7 @@ class Lowered(Unturned):
     body: Any
     level: float
 
-    # A chord from the wall may have a closed form that one from a level does not have.
+    # A chord from the wall may have a closed form where one from a level has none.
     chord_guess, chord_improve, chord_sweeps = Smooth.chord_guess, Smooth.chord_improve, Smooth.chord_sweeps
 
     def gap_of(self, q):
@@ -30,9 +30,9 @@ class Lowered(Unturned):
 
 
 def as_met(walls, number):
-    """The walls that a contact with this one may be one with: of fields and unions no other bodies, and no other rooms.
+    """Return the walls that a contact with wall `number` may involve: no other bodies of fields, and no other rooms.
 
-    Of each field one member is in its place, that with this number, which others do not reach.
+    Each field is replaced by one member, that with this number, which other walls do not reach.
     """
     each: Any = ()
     for first, wall in walls.shared():
@@ -49,6 +49,6 @@ def as_met(walls, number):
 
 
 def lowered(walls, number, r):
-    """All walls, that with this number lowered to the point r."""
+    """Return all walls, with wall `number` lowered to the point r."""
     levels = (select(number == k, wall.gap_of(wall.inner(r)), 0.0) for k, wall in enumerate(walls.each))
     return walls._replace(each=tuple(map(Lowered, walls.each, levels)))

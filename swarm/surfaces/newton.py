@@ -6,22 +6,22 @@ from ..kernel.jit import outlined
 from ..kernel.limits import EPSILON
 from ..kernel.vector import Vec, cross, dot, largest
 
-# Newton steps; changes below this part of a step may be noise.
+# The most Newton steps; changes below this part of a step may be noise.
 _ITERATIONS = 50
 _NOISE = 1e-12
 
 
 def push(surface, r0, p, kappa, tilt=None):
-    """The end of the step."""
+    """Return the end of the step."""
     return r0 + _moved(surface, r0, p, kappa, tilt)
 
 
 def rise(surface, r0, p, kappa, tilt=None):
-    """q1 - q0 of the step, and its derivative by kappa."""
+    """Return q1 - q0 of the step, and its derivative by kappa."""
     d = _moved(surface, r0, p, kappa, tilt)
     r1 = r0 + d
     g = surface.discrete_gradient(r0, r1)
-    # dr1/dkappa = -(I + kappa H)^-1 D, H of the midpoint: the derivative is as good as the step is short.
+    # dr1/dkappa = -(I + kappa H)^-1 D, with H of the midpoint: the error of the derivative falls with the step.
     f = _unpushed(surface.step_bend(r0, d), kappa, _tilted(g, tilt))
     return dot(g, d), -dot(f, surface.inner_gradient(r1))
 
@@ -33,7 +33,7 @@ def _tilted(g, tilt):
 
 @outlined
 def _moved(surface, r0, p, kappa, tilt):
-    """r1 - r0 = p - kappa Q D(r0, r1) with the H of the midpoint; NaN where it does not converge."""
+    """Return r1 - r0 = p - kappa Q D(r0, r1), with H of the midpoint; NaN where it does not converge."""
     d = _unpushed(surface.hessian(r0), kappa, p)
     size, previous = largest(p), math.inf
     for _i in range(_ITERATIONS):
@@ -48,7 +48,7 @@ def _moved(surface, r0, p, kappa, tilt):
 
 @outlined
 def resolve(surface, r, strength):
-    """The point s with s + strength grad q(s) = r; NaN where it does not converge."""
+    """Return the point s with s + strength grad q(s) = r; NaN where it does not converge."""
     s, size, previous = r, largest(r), math.inf
     for _i in range(_ITERATIONS):
         g = surface.inner_gradient(s)
@@ -61,7 +61,7 @@ def resolve(surface, r, strength):
 
 
 def _unpushed(h, strength, f):
-    """(I + strength H)^-1 f by the adjugate."""
+    """Return (I + strength H)^-1 f by the adjugate."""
     a, b, c = 1.0 + strength * h.xx, 1.0 + strength * h.yy, 1.0 + strength * h.zz
     d, e, g = strength * h.xy, strength * h.yz, strength * h.zx
     aa, ab, ac = b * c - e * e, g * e - d * c, d * e - g * b
@@ -71,5 +71,5 @@ def _unpushed(h, strength, f):
 
 
 def _converged(change, previous, size):
-    """Whether an iteration has reached round-off: its change is below it, or is near it and shrinks no more."""
+    """Whether an iteration has reached round-off: its change is below it, or is near it and no longer shrinks."""
     return change <= EPSILON * size or (change >= previous and change <= _NOISE * size)

@@ -9,6 +9,6 @@ Triangles = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 def halved(a: Any, b: Any, c: Any, d: Any) -> NDArray[np.int64]:
-    """The two triangles of each quadrilateral."""
+    """Return the two triangles of each quadrilateral."""
     both = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
     return np.asarray(both.reshape(-1, 3))

@@ -1,4 +1,4 @@
-"""The parts of a union or an intersection: checked, with what is given to the whole, and turned inside out."""
+"""The parts of a union or an intersection: checked, with the arguments of the whole, and on their other side."""
 
 from dataclasses import fields, replace
 from typing import Any
@@ -22,7 +22,7 @@ def checked_parts(value: Any, name: str) -> tuple[Surface, ...]:
 
 
 def handed_down(whole: Surface, part: Surface) -> Surface:
-    """A part with what is given to the whole, where it leaves that at its default."""
+    """Return a part with the arguments of the whole for those that it leaves at their defaults."""
     defaults = {one.name: one.default for one in fields(Surface)}
     given = {name: value for name, value in whole.common().items() if getattr(part, name) == defaults[name] != value}
     if part.temperature is not None:
@@ -33,7 +33,7 @@ def handed_down(whole: Surface, part: Surface) -> Surface:
 
 
 def other_side(surface: Surface) -> Surface:
-    """The same wall, admissible on its other side."""
+    """Return the same wall, admissible on its other side."""
     if isinstance(surface, Plane):
         x, y, z = surface.normal
         return replace(surface, normal=(-x, -y, -z), offset=-surface.offset)

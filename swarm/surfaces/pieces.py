@@ -19,13 +19,13 @@ Images = tuple[tuple[Surface, ...], ...]
 
 @dataclass(frozen=True)
 class Pieces:
-    """The simple surfaces of a scene: its surfaces without parts, the parts of others, and the images of both.
+    """The simple surfaces of a scene: surfaces without parts, the parts of all others, and the images of both.
 
     Attributes:
-        images: the images of every surface that reach into the cell; where nothing repeats the surface itself.
+        images: the images of every surface that reach into the cell; without a period the surface itself.
         each: the pieces, image by image.
-        owners: the number of the surface that each piece is, or is a part or an image of.
-        places: the place of each piece in that surface, () where it has no parts.
+        owners: for each piece the number of its surface: the piece is this surface, a part, or an image of it.
+        places: the place of each piece in its surface, () for a surface without parts.
         volumes: the volumes in which each piece is open.
         doorways: the volumes in which each piece is open where another room of its union is on its other side.
     """
@@ -38,11 +38,11 @@ class Pieces:
     doorways: Images
 
     def owned(self) -> Iterator[tuple[int, Surface]]:
-        """The pieces, each with the number of its surface."""
+        """Iterate over pairs of the number of a surface and a piece of it."""
         return zip(self.owners, self.each, strict=True)
 
     def as_walls(self) -> "Pieces":
-        """The same, where each field, and each union of several rooms, is one wall."""
+        """Return these pieces with each field, and each union of several rooms, as one wall."""
         rows: list[tuple[Any, ...]] = []
         first, each = 0, (self.each, self.owners, self.places, self.volumes, self.doorways)
         for i, image in ((i, image) for i, some in enumerate(self.images) for image in some):
@@ -56,7 +56,7 @@ class Pieces:
         return Pieces(images, *zip(*rows, strict=True))
 
     def rooms(self) -> list[tuple[tuple[int, ...], ...]]:
-        """Of each union of several rooms the numbers of the pieces of every room."""
+        """Return for each union of several rooms the numbers of the pieces of every room."""
         found, first = [], 0
         for image in itertools.chain(*self.images):
             if len(image.rooms) > 1:
@@ -66,15 +66,15 @@ class Pieces:
         return found
 
     def open_volumes(self) -> tuple[Surface, ...]:
-        """The volumes in which any piece is open."""
+        """Return the volumes in which any piece is open."""
         return tuple(itertools.chain(*self.volumes, *self.doorways))
 
 
 def pieces_of(surfaces: Sequence[Surface], period: Lengths | None, largest: float = 0.0) -> Pieces:
-    """The pieces that particles in the cell meet: points, or balls with radii up to the largest one [m].
+    """Return the pieces that particles in the cell meet: points, or balls with radii up to the largest one [m].
 
     Raises:
-        SceneError: a surface does not go with the period, or an opening does not reach the wall that it opens.
+        SceneError: a surface does not fit the period, or an opening does not reach the wall that it opens.
     """
     if any(one.is_solid() for one in surfaces):
         from .presence.flush import extended  # loaded where there are solids
@@ -97,7 +97,7 @@ def pieces_of(surfaces: Sequence[Surface], period: Lengths | None, largest: floa
 
 
 def differing_in(union: Surface) -> str | None:
-    """The name of an argument in which the parts of a union differ; None if they agree in all."""
+    """Return the name of an argument in which the parts of a union differ, or None if they agree in all."""
     surfaces = union.surfaces()
     from .fields.soft_rooms import IN_COMMON  # loaded where rooms are joined
 
@@ -113,7 +113,7 @@ def differing_in(union: Surface) -> str | None:
 
 
 def _with_reach(images: Images) -> Images:
-    """The surfaces of a scene with their images; their rooms overlap where they have a face in common."""
+    """Return the images of surfaces, with an overlap of rooms that have a face in common."""
     several = [one for some in images for one in some if len(one.rooms) > 1]
     reach = _REACH * max((piece.extent() for one in several for piece in one.surfaces()), default=0.0)
     return tuple(tuple(one.reaching(reach) for one in some) for some in images)
@@ -122,7 +122,7 @@ def _with_reach(images: Images) -> Images:
 def _volumes_of_pieces(
     surfaces: Sequence[Surface], images: Sequence[Sequence[Surface]], period: Lengths | None
 ) -> tuple[tuple[Surface, ...], ...]:
-    """The volumes in which every piece is open, of surfaces and the images of each."""
+    """Return the volumes in which every piece is open, for surfaces and the images of each."""
     found: list[tuple[Surface, ...]] = []
     for i, (surface, some) in enumerate(zip(surfaces, images, strict=True)):
         name = f"surfaces[{i}]"
@@ -135,14 +135,14 @@ def _volumes_of_pieces(
 
 
 def _volumes_of_parts(union: Surface, period: Lengths | None, name: str) -> dict[Place, tuple[Surface, ...]]:
-    """Those of the parts of a union: what is open of the whole is open where it reaches each of them."""
+    """Return the open volumes of the parts of a union: openings of the whole open each part that they reach."""
     pieces, places = union.surfaces(), union.places()
     for place, part in nodes_of(union):
-        # Of the whole by its number alone, as a surface without parts.
+        # Errors name the whole by its number alone, as a surface without parts.
         where = f"{name}{''.join(f'.parts[{k}]' for k in place)}"
         mine = [piece for piece, at in zip(pieces, places, strict=True) if at[: len(place)] == place]
         for k, opening in enumerate(part.openings):
-            # Of parts that leave no room there is no wall.
+            # Parts that leave no room have no wall.
             if mine and not any(reaches(piece, volume_of(opening)) for piece in mine):
                 raise SceneError(
                     f"{where}.openings[{k}] must reach the wall that it opens, got {opening}, in which no point of "
@@ -158,9 +158,9 @@ def _volumes_of_parts(union: Surface, period: Lengths | None, name: str) -> dict
 def _doorways_of_pieces(
     images: Sequence[Sequence[Surface]], volumes: Sequence[Sequence[Surface]]
 ) -> tuple[tuple[Surface, ...], ...]:
-    """The volumes in which every piece is open where another room of its union is on its other side.
+    """Return the volumes in which every piece is open where another room of its union is on its other side.
 
-    Those are the volumes of the other rooms, and those that open walls between rooms only.
+    These are the volumes of the other rooms, and those that open only walls between rooms.
     """
     found: list[tuple[Surface, ...]] = []
     for image in (image for some in images for image in some):

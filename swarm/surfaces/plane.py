@@ -1,4 +1,4 @@
-"""Scenes of two dimensions: the plane through the origin that their particles stay in, and what would leave it.
+"""Scenes of two dimensions: the plane through the origin that particles stay in, and checks that nothing leaves it.
 
 Seen from the tip of the axis across it, a plane has its first direction to the right and its second one upwards: x and
 y across z, y and z across x, z and x across y.
@@ -27,15 +27,15 @@ from .wall_law import leave_of, tries_of
 
 # The number of the axis across each plane.
 PLANES: dict[str | None, int] = {"x": 0, "y": 1, "z": 2}
-# Points from which places of a wall in the plane are looked for, the steps to them, and what is near to a wall, as a
-# part of the extent of the scene.
+# The number of points from which the search for places of a wall in the plane starts, its steps, and the distance
+# that is near to a wall, as a part of the extent of the scene.
 _STARTS, _STEPS, _NEAR = 2048, 40, 1e-9
 # A component of a unit normal across the plane up to this size counts as 0, as in the kernels.
 _ROUND_OFF = 1e-13
 
 
 def checked(plane: Any) -> str | None:
-    """The argument `plane`."""
+    """Return the argument `plane`, checked."""
     return None if plane is None else checks.one_of("plane", plane, "xyz")
 
 
@@ -45,11 +45,11 @@ def along(across: int) -> tuple[int, int]:
 
 
 def shown_as(across: int, points: Any) -> Any:
-    """Points (..., 3) as they are seen: (..., 2)."""
+    """Return points (..., 3) as they are seen in the plane: (..., 2)."""
     return np.asarray(points)[..., list(along(across))]
 
 
-# --- What would leave it ---------------------------------------------------------------------------------
+# --- Checks that nothing leaves it ------------------------------------------------------------------------
 
 
 def require_all(
@@ -74,7 +74,7 @@ def _require_pull(plane: str, gravity: Sequence[float]) -> None:
 
 
 def require_start(scene: Any, particles: Any, mend: str = "") -> None:
-    """Raise a `SceneError` where a particle starts out of the plane of a scene, or with what would lead out of it."""
+    """Raise a `SceneError` if a particle starts out of the plane, or with a velocity or spin that leads out."""
     across = PLANES.get(scene.plane)
     if across is None:
         return
@@ -104,7 +104,7 @@ def require_start(scene: Any, particles: Any, mend: str = "") -> None:
 def _require_walls(plane: str, surfaces: Sequence[Surface], reach: float) -> None:
     """Raise a `SceneError` where a wall, or its motion, would send particles out of the plane.
 
-    `reach` is how far from the origin walls are looked at [m].
+    `reach` is the distance from the origin within which walls are checked [m].
     """
     across = PLANES[plane]
     for i, surface in enumerate(surfaces):
@@ -132,7 +132,7 @@ def _require_walls(plane: str, surfaces: Sequence[Surface], reach: float) -> Non
 
 
 def _require_upright(plane: str, i: int, surface: Outlined) -> None:
-    """The same of an outline, which is along the plane or not."""
+    """Raise a `SceneError` if an outline does not stand upright on the plane."""
     if surface.across != PLANES[plane]:
         raise SceneError(
             f'surfaces[{i}] must stand upright on the plane {plane} = 0 where plane = "{plane}", got '
@@ -156,7 +156,7 @@ def _mended(surface: Surface, across: int) -> str:
 
 
 def _walls_in(surface: Surface, across: int, reach: float) -> tuple[Floats, Floats]:
-    """Places (3, N) of a wall in the plane, and the part of its unit normal there that is out of the plane (N,)."""
+    """Return places (3, N) of a wall in the plane, and the component of its unit normal across the plane (N,)."""
     points = _starts(surface, across, reach)
     with np.errstate(all="ignore"):
         for _step in range(_STEPS):
@@ -170,14 +170,14 @@ def _walls_in(surface: Surface, across: int, reach: float) -> tuple[Floats, Floa
         steep = np.sqrt((slope**2).sum(axis=0))
         part = slope[across] / steep
         if isinstance(surface, ManyBodies) and surface.kind is not Sphere:
-            # As kernels take their axes.
+            # Rounded as in the kernels.
             part = np.where(np.abs(part) <= _ROUND_OFF, 0.0, part)
         here = np.isfinite(part) & (np.abs(phi) <= _NEAR * reach * steep)
     return points[:, here], part[here]
 
 
 def _level(surface: Surface, across: int, points: Floats) -> tuple[Floats, Floats]:
-    """phi at points (3, N) of the plane, and its gradient, as kernels take it."""
+    """Return phi at points (3, N) of the plane, and its gradient, as kernels compute them."""
     if isinstance(surface, ManyBodies) or surface.motion is not None:
         return surface.phi(points), surface.gradient(points)
     walls, rows = [upright(wall, across) for wall in surface.walls()], vec(points)
@@ -187,10 +187,10 @@ def _level(surface: Surface, across: int, points: Floats) -> tuple[Floats, Float
 
 
 def _starts(surface: Surface, across: int, reach: float) -> Floats:
-    """Points of the plane from which walls are looked for; of many bodies also the middles, and beside them."""
+    """Return points in a plane at which the search for walls starts, with middles of many bodies and points beside."""
     random = np.random.default_rng(0)
     points = [reach * (2.0 * random.random((3, _STARTS)) - 1.0)]
-    # Also near to what is small or far away
+    # Also near surfaces that are small or far away
     size = surface.size()
     center = np.array(getattr(surface, "center", (0.0, 0.0, 0.0)))[:, None]
     if math.isfinite(size):
@@ -230,7 +230,7 @@ def _require_laws(plane: str, where: str, surface: Surface) -> None:
 
 
 def _leaving(part: Any, across: int) -> Iterable[str]:
-    """The parts of a motion that leave the plane."""
+    """Yield the parts of a motion that leave the plane, in words."""
     name = type(part).__name__
     if isinstance(part, Translation) and part.velocity[across] != 0.0:
         yield f"{name} with velocity[{across}] = {part.velocity[across]:g} m/s"

@@ -1,4 +1,4 @@
-"""Checks that a surface has the methods, and the box in which it is known, that its use needs, before compilation."""
+"""Checks before compilation that a surface has the methods, and the box in which it is known, for its use."""
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -15,7 +15,7 @@ from .rotation import Rotated
 from .shapes.solid import SolidNumbers
 from .surface import Surface, shown
 
-# What the definitions of contract.py ask for themselves. What has none there, such as `hessian`, must be given.
+# The methods that the definitions of contract.py call. Methods without a definition, such as `hessian`, must be given.
 _MADE_OF = {
     "inner": ("phi",),
     "inner_gradient": ("gradient",),
@@ -36,17 +36,17 @@ _MADE_OF = {
     "chord_improve": ("rise",),
     "chord_normal": ("push", "side"),
 }
-# Their definitions hold for the inner function q = phi only: a surface with another q gives these too.
+# These definitions hold for the inner function q = phi only: a surface with another q overrides them too.
 _OF_PHI = ("gap_of", "gap_slope", "inner_gradient")
-# What a solid of several parts asks of each.
+# The methods that a solid of several parts calls on each.
 _OF_PARTS = ("phi", "gradient", "distance", "gap_scale", "unit_normal", "first_hit")
 _DESCRIPTION = ("size", "bounds", "extent")
-# Of the width of a box in which a surface is known, by how much particles may leave it: round-off.
+# Particles may leave the box in which a surface is known by this part of its width: round-off.
 _ROUND_OFF = 1e-9
 
 
 def require(surfaces: Sequence[Surface], purpose: str, asked: Iterable[str], name: str | None = None) -> None:
-    """Raise a `SceneError` where a surface does not give what the functions `asked` of its walls are made of.
+    """Raise a `SceneError` if a surface lacks methods on which the methods `asked` of its walls depend.
 
     `name` is the name of a single surface that is not in the list of a scene.
     """
@@ -64,7 +64,7 @@ def require(surfaces: Sequence[Surface], purpose: str, asked: Iterable[str], nam
 
 
 def require_description(surfaces: Sequence[Surface], name: str | None = None) -> None:
-    """Raise a `SceneError` where the class of a surface lacks a method, or its walls phi and gradient."""
+    """Raise a `SceneError` if the class of a surface lacks a method, or its walls phi and gradient."""
     for i, surface in enumerate(surfaces):
         kind = type(surface)
         lacking = [name for name in _DESCRIPTION if getattr(kind, name) is getattr(Surface, name)]
@@ -78,7 +78,7 @@ def require_description(surfaces: Sequence[Surface], name: str | None = None) ->
 
 
 def _asked_of(wall: Any, asked: tuple[str, ...]) -> Iterator[tuple[Any, tuple[str, ...]]]:
-    """Numbers with methods that a wall needs, and which ones: also those of a turned body, and of a solid's parts."""
+    """Yield records and the methods that each needs: the body of a turned wall, and the parts of a solid, too."""
     if isinstance(wall, Rotated):
         yield from _asked_of(wall.body, asked)
         return
@@ -93,7 +93,7 @@ def _asked_of(wall: Any, asked: tuple[str, ...]) -> Iterator[tuple[Any, tuple[st
 
 
 def _lacking(wall: Any, name: str) -> Iterator[str]:
-    """The methods without which a method of a wall does not work."""
+    """Yield the methods that a method of a wall needs and that the wall lacks."""
     if not isinstance(wall, Smooth):
         yield "the base class swarm.surfaces.contract.Smooth"
     elif name == "side":
@@ -101,7 +101,7 @@ def _lacking(wall: Any, name: str) -> Iterator[str]:
     elif name == "falling_hit" and wall.is_quartic:
         yield from () if wall.gives("course") else ("course()",)
     elif wall.gives(name) or (name == "turned_push" and wall.flat_normal() is not None):
-        # A flat wall is pushed as at rest, however it turns.
+        # The push of a flat wall that turns is that of one at rest.
         return
     elif name in _OF_PHI and wall.gives("inner"):
         yield f"{name}() for its `inner`"
@@ -117,11 +117,11 @@ def _lacking(wall: Any, name: str) -> Iterator[str]:
 def require_known(
     surfaces: Sequence[Surface], bounds: Callable[[list[Surface]], tuple[NDArray[np.float64], NDArray[np.float64]]]
 ) -> None:
-    """Raise a `SceneError` where particles may leave the box in which a surface is known.
+    """Raise a `SceneError` if particles may leave the box in which a surface is known.
 
     Args:
-        surfaces: those of a scene.
-        bounds: the corners of a box around the volume that some of them leave.
+        surfaces: the surfaces of a scene.
+        bounds: function that returns the corners of a box around the volume that given surfaces leave.
     """
     for i, surface in enumerate(surfaces):
         known = surface.known_in()

@@ -13,20 +13,20 @@ from .surface import UNBOUNDED, Box, HalfSpace, Surface
 
 Room = tuple[Surface, ...]
 
-# A room without end is searched for a point as far as this many times the extent of its surfaces.
+# An unbounded room is searched for a point up to this multiple of the extent of its surfaces.
 _REACH = 2.0
-# Where planes leave the volume open, their polyhedron is cut off at this many times the scene's extent.
+# Where planes leave the volume open, their polyhedron is cut off at this multiple of the extent of the scene.
 _FAR = 1e6
-# If that cuts the volume, it is bounded again at this distance, with the round-off of a vertex there.
+# If that cuts the volume, the volume is bounded again at this distance, with the round-off of a vertex there.
 _FARTHEST, _ROUND_OFF = 1e15, 1e-14
-# Determinants of three normals: below the first they meet in a flat corner, below the second in none.
+# Determinants of three normals: below the first the planes meet in a flat corner, below the second in none.
 _FLAT, _PARALLEL = 1e-12, 1e-15
-# Triples of planes that are intersected at once.
+# The number of triples of planes that are intersected at once.
 _TRIPLES = 4096
 
 
 def room_bounds(room: Sequence[Surface], time: float = 0.0, within: Box = UNBOUNDED) -> tuple[Floats, Floats]:
-    """The corners of a box around what of a room is `within` another box at a time [s], infinite where it is open."""
+    """Return the corners of a box around the part of a room `within` a box at a time [s], infinite where it is open."""
     boxes = np.array([*(box_of(surface, time) for surface in room), within])
     low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
     planes = [plane for surface in room for plane in planes_of(surface, surface.half_spaces(), time)]
@@ -34,7 +34,7 @@ def room_bounds(room: Sequence[Surface], time: float = 0.0, within: Box = UNBOUN
 
 
 def lasting(room: Sequence[Surface]) -> tuple[Surface, ...]:
-    """The surfaces of a room that are always there."""
+    """Return the surfaces of a room that are always present."""
     return tuple(surface for surface in room if surface.present is None)
 
 
@@ -59,13 +59,13 @@ def has_volume(room: Room) -> bool:
 
 
 def union_bounds(rooms: Iterable[Room]) -> Box:
-    """The corners of the box around rooms."""
+    """Return the corners of the box around rooms."""
     low, high = zip(*map(room_bounds, rooms), strict=True)
     return tuple(np.min(low, axis=0).tolist()), tuple(np.max(high, axis=0).tolist())
 
 
 def _ends(room: Room) -> tuple[Floats, Floats]:
-    """The corners of the box in which a room is searched for a point."""
+    """Return the corners of the box in which a room is searched for a point."""
     low, high = room_bounds(room)
     reach = _REACH * max((surface.extent() for surface in room), default=0.0) or 1.0
     return np.maximum(low, -reach), np.minimum(high, reach)
@@ -75,7 +75,7 @@ def _ends(room: Room) -> tuple[Floats, Floats]:
 
 
 def polyhedron_bounds(planes: list[HalfSpace], low: Any, high: Any) -> tuple[Any, Any]:
-    """Bounds of the half-spaces' intersection with a box, from its vertices."""
+    """Return bounds of the intersection of half-spaces with a box, from its vertices."""
     finite = [abs(v) for v in (*low, *high) if math.isfinite(v)] + [abs(offset) for _normal, offset in planes]
     scale = max(finite, default=0.0) or 1.0
     new_low, new_high, is_open, is_flat = _closed_bounds(planes, low, high, _FAR * scale, _FLAT, 1e-9)
@@ -90,13 +90,13 @@ def polyhedron_bounds(planes: list[HalfSpace], low: Any, high: Any) -> tuple[Any
 
 
 def _solutions(matrices: Any, sides: Any) -> tuple[Any, Any]:
-    """Of (n, 3, 3) linear systems with these right sides (n, 3), and |det|, by elimination with pivots.
+    """Return the solutions of (n, 3, 3) linear systems with right sides (n, 3), and |det|, by elimination with pivots.
 
-    `fill` scales its points by what follows from them, and the last bit of LAPACK depends on the processor. Cramer's
-    rule has too few digits for a cone of half angle near pi/2.
+    `fill` scales its points by the bounds that follow from them, and the last bit of LAPACK depends on the processor.
+    Cramer's rule has too few digits for a cone of half angle near pi/2.
     """
     rows, every = np.concatenate([matrices, sides[:, :, None]], axis=2), np.arange(len(sides))
-    with np.errstate(all="ignore"):  # where the matrix is singular there is no solution
+    with np.errstate(all="ignore"):  # a singular matrix has no solution
         for k in range(2):
             pivot = k + np.abs(rows[:, k:, k]).argmax(axis=1)
             rows[every, k], rows[every, pivot] = rows[every, pivot], rows[every, k]
@@ -111,7 +111,7 @@ def _solutions(matrices: Any, sides: Any) -> tuple[Any, Any]:
 def _closed_bounds(
     planes: list[HalfSpace], low: Any, high: Any, far: float, flattest: float, tolerance: float
 ) -> tuple[Any, Any, bool, bool]:
-    """Bounds from the vertices within a far box; whether the box cuts the volume, and whether a vertex was too flat."""
+    """Return bounds from vertices in a far box, whether the box cuts the volume, and whether a vertex was too flat."""
     box_low, box_high = np.maximum(low, -far), np.minimum(high, far)
     normals = np.vstack([[normal for normal, _offset in planes], np.eye(3), -np.eye(3)])
     offsets = np.concatenate([[offset for _normal, offset in planes], box_high, -box_low])
@@ -123,7 +123,7 @@ def _closed_bounds(
         vertices, flat = _solutions(normals[index], offsets[index])
         is_flat = is_flat or bool(((flat <= flattest) & (flat > _PARALLEL)).any())
         vertices = vertices[flat > flattest]
-        # Also those that are not finite: planes that are parallel but for a component of 1e-300.
+        # Vertices that are not finite are left out too: their planes are parallel up to a component of 1e-300.
         vertices = vertices[np.abs(vertices).max(axis=1, initial=0.0) <= 2.0 * far]
         room = tolerance * (np.abs(offsets) + np.abs(vertices).max(axis=1, initial=0.0)[:, None])
         vertices = vertices[(vertices @ normals.T <= offsets + room).all(axis=1)]

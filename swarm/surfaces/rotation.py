@@ -1,4 +1,4 @@
-"""Rotations as unit quaternions (w, x, y, z): what an argument may say, and what follows from it."""
+"""Rotations as unit quaternions (w, x, y, z): the forms of the argument, and their use."""
 
 import logging
 import math
@@ -24,7 +24,7 @@ _ORTHONORMAL = 1e-6
 
 
 def quaternion(name: str, value: Any) -> Quaternion | None:
-    """A rotation as a unit quaternion; None where it turns nothing.
+    """Return a rotation as a unit quaternion, or None for the identity.
 
     Args:
         name: the argument's name, for errors.
@@ -60,7 +60,7 @@ def quaternion(name: str, value: Any) -> Quaternion | None:
 
 
 def quaternions(name: str, value: Any, count: int) -> NDArray[np.float64]:
-    """Rotations of many bodies as quaternions (n, 4), of the lengths that are given.
+    """Return the rotations of many bodies as quaternions (n, 4), of the lengths that are given.
 
     Args:
         name: the argument's name, for errors.
@@ -77,7 +77,7 @@ def quaternions(name: str, value: Any, count: int) -> NDArray[np.float64]:
 
 
 def _of_matrices(name: str, given: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit quaternions of rotation matrices, each from its largest part, which no difference of near numbers makes."""
+    """Return unit quaternions of rotation matrices, each by its largest part, without a difference of near numbers."""
     many = given.reshape(-1, 3, 3)
     products = many @ np.swapaxes(many, 1, 2)
     bad = ~(np.abs(products - np.eye(3)).max(axis=(1, 2)) <= _ORTHONORMAL) | (np.linalg.det(many) < 0.0)
@@ -104,7 +104,7 @@ def _of_matrices(name: str, given: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def unit(name: str, value: Any, count: int = 3) -> tuple[float, ...]:
-    """`value` as that many numbers scaled to length 1, whatever their magnitude; kept if that is their length."""
+    """Return `count` numbers scaled to length 1 from any finite length, or unchanged if their length is 1."""
     parts: tuple[float, ...] = ()
     if count == 3:
         parts = vector(name, value)
@@ -118,11 +118,11 @@ def unit(name: str, value: Any, count: int = 3) -> tuple[float, ...]:
     largest = max(map(abs, parts))
     if largest == 0.0:
         raise SceneError(f"{name} must not be of length 0, got {tuple(parts)}")
-    # Scaled first: the square of a part itself may not be a number.
+    # Scaled first: the square of a part itself may overflow or underflow.
     scaled = [part / largest for part in parts]
     length = math.hypot(*scaled)
     if abs(math.hypot(*parts) - 1.0) <= UNIT_LENGTH:
-        # What was scaled before keeps its bits: a surface from its own repr or table is the same one.
+        # Scaled values keep their bits: a surface from its own repr or table equals the original.
         return parts
     return tuple(part / length for part in scaled)
 
@@ -131,18 +131,18 @@ Direction = Annotated[Vector, unit]
 
 
 def normalized(vectors: NDArray[np.float64], axis: int = 0) -> NDArray[np.float64]:
-    """Vectors along an axis of an array, divided by their lengths; one of length 0 stays 0."""
+    """Return the vectors along an axis of an array, divided by their lengths; a vector of length 0 stays 0."""
     lengths = np.sqrt((vectors**2).sum(axis=axis, keepdims=True))
     return np.asarray(vectors / np.maximum(lengths, TINY))
 
 
 def matrix(turn: Quaternion | None) -> NDArray[np.float64]:
-    """The rotation matrix of a unit quaternion: from the surface's own frame to the scene's."""
+    """Return the rotation matrix of a unit quaternion: from the surface's own frame to the scene's."""
     return np.eye(3) if turn is None else np.array(_matrix_of(*turn))
 
 
 def matrices(turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
+    """Return the rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
     return np.moveaxis(np.array(_matrix_of(*turns.T)), 2, 0)
 
 
@@ -155,16 +155,16 @@ def _matrix_of(w: Any, x: Any, y: Any, z: Any) -> list[list[Any]]:
 
 
 def onto(axis: Vector) -> Quaternion | None:
-    """The shortest rotation of the z axis onto the unit vector `axis`."""
+    """Return the shortest rotation of the z axis onto the unit vector `axis`."""
     x, y, z = axis
     if x == 0.0 and y == 0.0:
         return None if z > 0.0 else (0.0, 1.0, 0.0, 0.0)
-    # Half way between z and the axis; near -z their sum cancels, but not for the quaternion's purpose.
+    # Half way between z and the axis; near -z their sum cancels, which does no harm to the quaternion.
     return unit("axis", (1.0 + z, -y, x, 0.0), 4)  # type: ignore[return-value]
 
 
 def after(second: Quaternion | None, first: Quaternion | None) -> Quaternion | None:
-    """The rotation `first`, followed by `second`."""
+    """Return the rotation `first`, followed by `second`."""
     if first is None or second is None:
         return second if first is None else first
     a, b, c, d = second
@@ -178,12 +178,12 @@ def after(second: Quaternion | None, first: Quaternion | None) -> Quaternion | N
 
 
 def turned(turn: Quaternion | None, point: Vector) -> Vector:
-    """A vector, rotated."""
+    """Return a vector, rotated."""
     return point if turn is None else tuple(product(matrix(turn), point).tolist())
 
 
 def turned_back(turn: Quaternion | None, point: Vector) -> Vector:
-    """A vector of the scene in the surface's own frame."""
+    """Return a vector of the scene in the surface's own frame."""
     return point if turn is None else tuple(product(matrix(turn).T, point).tolist())
 
 
@@ -196,22 +196,22 @@ class Rotated(Framed):
     z: Vec
 
     def vector_in(self, a):
-        """A vector of the scene in the surface's own frame."""
+        """Return a vector of the scene in the surface's own frame."""
         return self.x * a.x + self.y * a.y + self.z * a.z
 
     def vector_out(self, a):
-        """A vector of the surface's own frame in the scene."""
+        """Return a vector of the surface's own frame in the scene."""
         return Vec(dot(self.x, a), dot(self.y, a), dot(self.z, a))
 
     place_in = end_in = velocity_in = way_in = vector_in
     place_out = end_out = normal_out = vector_out
 
     def swings_in(self, swings):
-        """The swings of a wall in the frame of the body."""
+        """Return the swings of a wall in the frame of the body."""
         return swings.turned(self.vector_in)
 
     def seen_in(self, seen):
-        # What bounds the flight along a direction, too, is of the motion in the frame of the body.
+        # The drive, which bounds the flight along a direction, is turned into the frame of the body too.
         drive = seen.drive
         jerks = drive.jerks.x * absolute(self.x) + drive.jerks.y * absolute(self.y) + drive.jerks.z * absolute(self.z)
         turn = drive.turn
@@ -224,7 +224,7 @@ class Rotated(Framed):
         return None if n is None else self.vector_out(n)
 
     def gravity_in(self, gravity):
-        """Gravity, or none, in the surface's own frame."""
+        """Return gravity, or None, in the surface's own frame."""
         if gravity is None:
             return None
         turned = self.vector_in(as_vector(gravity))
@@ -232,7 +232,7 @@ class Rotated(Framed):
 
 
 def framed(axes: NDArray[np.float64], body: Any) -> Any:
-    """A surface with these columns as its own axes, as kernels take it."""
+    """Return a surface with these columns as its own axes, as a record for kernels."""
     if np.array_equal(axes, np.eye(3)):
         return body
     right = np.rint(axes)
@@ -242,5 +242,5 @@ def framed(axes: NDArray[np.float64], body: Any) -> Any:
 
 
 def rotated(turn: Quaternion | None, body: Any) -> Any:
-    """A rotated surface as kernels take it; `body` has its centre in its own frame, `turned_back(turn, center)`."""
+    """Return a rotated surface as a record for kernels; `body` has its centre at `turned_back(turn, center)`."""
     return framed(matrix(turn), body)

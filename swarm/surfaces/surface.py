@@ -1,4 +1,4 @@
-"""A surface as users describe it, checked. As kernels take it, it is a record: see contract.py."""
+"""A surface as users describe it, checked. Kernels take it as a record: see contract.py."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -19,9 +19,9 @@ from .area_samples import AreaSample, Region, by_lines
 from .presence.doors import Opening, Spans, checked_spans, is_there
 from .wall_law import checked_laws
 
-# The component along an axis of a unit vector that is along it.
+# The least component along an axis of a unit vector that counts as along it.
 _PARALLEL = 0.5
-# A tilt of an axis this small is the round-off of a rotation.
+# A tilt of an axis up to this size is the round-off of a rotation.
 TILT = 1e-15
 SIDES = {"inside": 1.0, "outside": -1.0}
 
@@ -30,14 +30,14 @@ HalfSpace = tuple[Vector, float]
 UNBOUNDED: Box = ((-math.inf,) * 3, (math.inf,) * 3)
 # The arguments of a surface on which an impact, or a contact, depends besides its shape and its motion.
 LAWS = "restitution", "friction", "rolling", "temperature", "accommodation", "laws"
-# The number of a part, and of a part of this.
+# The number of a part, followed by the number of its part, and so on.
 Place = tuple[int, ...]
 # phi and its gradient (N, 3), functions of points (N, 3).
 LevelSet = tuple[Callable[[Any], Any], Callable[[Any], Any]]
 
 
 def _openings(name: str, value: Any) -> "tuple[Surface | Opening, ...]":
-    """`value` as a tuple of openings."""
+    """Return `value` as a tuple of openings, checked."""
     given = checks.list_of(name, value, "surfaces such as swarm.Sphere", Surface, Opening)
     for k, one in enumerate(given):
         opening = one.surface if isinstance(one, Opening) else one
@@ -63,7 +63,7 @@ class Surface(Validated):
     Args:
         rotation: about the centre, or the origin where there is no `center`: None, a quaternion (w, x, y, z) of any
             length, {"axis": (x, y, z), "angle": rad}, or the rows of a rotation matrix. A union, an intersection or a
-            field of many bodies gives it to each of these.
+            field of many bodies applies it to each part or body.
         restitution: e in [0, 1]: an impact turns the normal velocity v_n into -e v_n. 1 keeps the energy.
         friction: Coulomb's coefficient, 0 or more: the tangential impulse, or force, opposes the slip; it is at most
             this times the normal one, and at most what stops the slip.
@@ -82,12 +82,12 @@ class Surface(Validated):
         inertia: the moment of inertia of a wall that impacts turn about the axis of its `Rotation` [kg m^2], above 0;
             the rate is that at the start. With a mass too it is a pendulum with its weight at its `center`, without one
             the weight is on the axis.
-        openings: surfaces without openings, laws and motion; inside each of them the wall is not there (with side
+        openings: surfaces without openings, laws and motion; the wall is absent inside each of them (with side
             "outside": outside of it; of many bodies, such as `Spheres`: in each body). A particle that reaches the wall
             there has escaped, and keeps its place and velocity. Only a wall at rest, or one with a mass, has openings;
             they move with it. An `Opening` is open for some times only.
-        present: pairs (t0, t1) [s] that ascend, from 0 s on: the wall is there from t0 on, and no longer from t1 on,
-            which is infinite in the last pair if it stays. None: it is always there.
+        present: pairs (t0, t1) [s] that ascend, from 0 s on: the wall is present from t0 to t1. In the last pair t1 is
+            infinite if the wall stays. None: it is always present.
     """
 
     rotation: Annotated[Any, rotations.quaternion] = field(default=None, kw_only=True)
@@ -102,7 +102,7 @@ class Surface(Validated):
     inertia: PositiveMagnitude | None = field(default=None, kw_only=True)
     openings: Annotated[Any, _openings] = field(default=(), kw_only=True)
     present: Annotated[Spans, checked_spans] = field(default=None, kw_only=True)
-    # Arguments that a class does not take, and what takes their place.
+    # Arguments that a class does not take, and the sentence that says what to give instead.
     refused: ClassVar[tuple[str, ...]] = ()
     instead: ClassVar[str] = ""
 
@@ -138,25 +138,25 @@ class Surface(Validated):
             )
 
     def __repr__(self) -> str:
-        """The call that makes it, omitting defaults."""
+        """Return the call that makes the surface, without defaults."""
         return self._call((), sorted(fields(self), key=lambda field: bool(field.kw_only)))
 
     def _call(self, given: Iterable[str], named: Iterable[Field[Any]]) -> str:
-        """The call with what is `given` as it is, and those of the named fields that are no defaults."""
+        """Return the call with the arguments `given`, and the `named` fields that differ from their defaults."""
         changed = [one for one in named if one.default is MISSING or getattr(self, one.name) != one.default]
         arguments = *given, *(f"{one.name}={getattr(self, one.name)!r}" for one in changed)
         return f"{type(self).__name__}({', '.join(arguments)})"
 
     def numbers(self) -> Any:
-        """The record that kernels take in place of this description, before it is rotated."""
+        """Return the record for kernels, before it is rotated."""
         raise NotImplementedError
 
     def walls(self) -> tuple[Any, ...]:
-        """The records that kernels take: one for a smooth surface, one for each smooth part of a cavity with edges."""
+        """Return the records for kernels: one for a smooth surface, one for each smooth part of a cavity with edges."""
         return (rotations.rotated(self.rotation, self.numbers()),)
 
     def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
-        """The records that kernels take for balls, as many as `walls` and in their order; each has a `grown`.
+        """Return the records for kernels of balls, one for each of `walls` and in their order; each has a `grown`.
 
         No radius of a ball is above `largest` [m].
         """
@@ -173,68 +173,68 @@ class Surface(Validated):
         return math.inf
 
     def most_bent_at(self) -> Vector | None:
-        """The point of the surface with that radius; None where it is not computed."""
+        """The point of the surface with this radius; None where it is not computed."""
         return None
 
     def open_volumes(self, between: bool = False) -> tuple["Surface", ...]:
-        """The volumes of its openings, `present` while these are open: those `between` rooms, or all others."""
+        """Return the volumes of its openings, `present` while these are open: those `between` rooms, or all others."""
         return tuple(volume_of(one) for one in self.openings if (isinstance(one, Opening) and one.between) == between)
 
     def is_there(self, time: float) -> bool:
-        """Whether the wall is there at a time [s]."""
+        """Whether the wall is present at a time [s]."""
         return is_there(self.present, time)
 
     def reacts(self) -> bool:
-        """Whether impacts move it."""
+        """Whether impacts move the surface."""
         return self.mass is not None or self.inertia is not None
 
     def at_rest(self) -> "Surface":
-        """The surface without motion and mass, where it is given."""
+        """Return the surface without motion and mass, at the place where it is given."""
         return self if self.motion is None else replace(self, motion=None, mass=None, inertia=None)
 
     def own_center(self) -> Vector:
-        """The centre in the frame in which the surface is not rotated; both frames have the same origin."""
+        """Return the centre in the frame in which the surface is not rotated; both frames have the same origin."""
         return rotations.turned_back(self.rotation, self.center)  # type: ignore[attr-defined]
 
     def size(self) -> float:
-        """The characteristic length of the surface [m], or infinity."""
+        """Return the characteristic length of the surface [m], or infinity."""
         raise NotImplementedError
 
     def bounds(self) -> Box:
-        """A box (lower, upper) around the admissible side; infinite where that side is open."""
+        """Return a box (lower, upper) around the admissible side; infinite where that side is open."""
         raise NotImplementedError
 
     def half_spaces(self) -> list[HalfSpace]:
-        """Half-spaces n.r <= offset around the admissible side that are tighter than `bounds`."""
+        """Return half-spaces n.r <= offset around the admissible side that are tighter than `bounds`."""
         return []
 
     def flat_faces(self) -> NDArray[np.float64]:
-        """Of an outline or a mesh the planes of flat faces: rows of unit normals along which phi grows, and offsets."""
+        """Return flat faces of an outline or a mesh: rows of unit normals, along which phi grows, and offsets."""
         return np.empty((0, 4))
 
     def with_flat_face_out(self, number: int, by: float) -> "Surface | None":
-        """The surface with one of `flat_faces` so far along its normal [m]; None: it cannot be moved."""
+        """Return the surface with one of `flat_faces` moved along its normal by `by` [m]; None: it cannot be moved."""
         return None
 
     def places_of_flat_face(self, number: int, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Points on one of `flat_faces`, and on its edges, (3, count) each; None: they are not known."""
+        """Return points on one of `flat_faces`, and on its edges, (3, count) each; None: they are not known."""
         return None
 
     def open_faces(self) -> list[HalfSpace]:
-        """The faces (n, offset) at which the surface ends without a wall; n.r > offset is beyond one."""
+        """Return the faces (n, offset) at which the surface ends without a wall; n.r > offset is beyond one."""
         return []
 
     def known_in(self) -> Box | None:
-        """The box in which the surface is defined, and particles must stay; None: it is defined everywhere."""
+        """Return the box in which the surface is defined, and particles must stay; None: it is defined everywhere."""
         return None
 
     def shifted(self, shift: Vector) -> "Surface":
-        """The surface moved by a shift [m]."""
+        """Return the surface moved by a shift [m]."""
         x, y, z = (a + b for a, b in zip(self.center, shift, strict=True))  # type: ignore[attr-defined]
         return replace(self, center=(x, y, z))  # type: ignore[call-arg]
 
     def turned(self, turn: rotations.Quaternion) -> "Surface":
-        """The surface, with its openings, rotated about the origin."""
+        """Return the surface, with its openings, rotated about the origin."""
         given: dict[str, Any] = {"rotation": rotations.after(turn, self.rotation)}
         if hasattr(self, "center"):
             given["center"] = rotations.turned(turn, self.center)
@@ -247,15 +247,15 @@ class Surface(Validated):
     def require_compiled(self) -> None:
         """Raise a `SceneError` if Numba cannot compile a user-defined function, before a kernel needs it."""
 
-    # Whether the inner side is convex: then nothing of it is on the other side of its wall.
+    # Whether the inner side is convex: then no part of it is beyond its own wall.
     is_convex = False
-    # Whether it has many bodies, or sides, of one kind, which kernels take as one field.
+    # Whether the surface has many bodies, or sides, of one kind, which kernels take as one field.
     is_field = False
     # Whether kernels take a field as one soft wall.
     is_one_wall = False
     # The noun for one of its faces, if its walls are faces between edges.
     face_noun: ClassVar[str] = ""
-    # Whether a solid of it has edges, and whether its wall may have a point without a normal.
+    # Whether a solid of this kind has edges, and whether its wall may have a point without a normal.
     has_edges = False
     may_have_tip = False
     # The nouns for a cavity, a solid, and both in a plane; None: the name of the class.
@@ -268,59 +268,59 @@ class Surface(Validated):
 
     @property
     def rooms(self) -> tuple[tuple["Surface", ...], ...]:
-        """The admissible side as a union of rooms: intersections of surfaces without parts."""
+        """Return the admissible side as a union of rooms: intersections of surfaces without parts."""
         return ((self,),)
 
     def unproved(self) -> str:
-        """What a user-defined phi may have and must not, for errors; empty where the engine knows that it has not."""
+        """Return a defect that a user-defined phi may have, for errors; empty if the engine knows that it has none."""
         return ""
 
     def surfaces(self) -> tuple["Surface", ...]:
-        """The surfaces of all rooms, one after the other, with what is given to the whole."""
+        """Return the surfaces of all rooms, one after the other, with the arguments of the whole."""
         return (self,)
 
     def places(self) -> tuple[Place, ...]:
-        """For each of the `surfaces` the place of its part: its number, or for a part of a part the numbers of both."""
+        """Return the place of the part of each of the `surfaces`: its number, followed by those of parts of parts."""
         return ((),)
 
     def places_of_parts(self) -> tuple[Place, ...]:
-        """The places of all parts, in order."""
+        """Return the places of all parts, in order."""
         return ()
 
     def moving_apart(self) -> list[tuple["Surface", "Surface"]]:
-        """Pairs of surfaces of its rooms that have a face in common at the start and different motions."""
+        """Return pairs of surfaces of its rooms that have a face in common at the start and different motions."""
         return []
 
     def common_places(self) -> list[tuple[Place, Place]]:
-        """Pairs of places of parts that have a face in common."""
+        """Return pairs of places of parts that have a face in common."""
         return []
 
     def reaching(self, reach: float) -> "Surface":
-        """The surface with rooms that overlap by so much [m] where they have a face in common."""
+        """Return the surface with rooms that overlap by `reach` [m] where they have a face in common."""
         return self
 
     def runs(self, walls: int) -> list[tuple["Surface", int]]:
-        """Its walls in runs with the same laws: (the surface that has the laws, the number of walls)."""
+        """Return its walls in runs with the same laws: (the surface that has the laws, the number of walls)."""
         return [(self, walls)]
 
     def solids(self) -> list["Surface"]:
-        """Every body as a separate surface."""
+        """Return every body as a separate surface."""
         return [self]
 
     def as_one_wall(self) -> "Surface":
-        """The surface for soft walls: a field, or a union of several rooms, is one wall."""
+        """Return the surface for soft walls: a field, or a union of several rooms, is one wall."""
         return self
 
     def body_count(self) -> int:
-        """The number of bodies of a field, else 0."""
+        """Return the number of bodies of a field, else 0."""
         return 0
 
     def wall_count(self, of_balls: bool) -> int:
-        """The number of walls that points, or balls, meet, with all members of a field."""
+        """Return the number of walls that points, or balls, meet, with all members of a field."""
         return len(self.walls())
 
     def faces_of_balls(self, largest: float) -> tuple[Any, NDArray[Any]]:
-        """(the members that soft balls with radii up to the largest one [m] meet, the face of each member).
+        """Return (the members that soft balls with radii up to the largest one [m] meet, the face of each member).
 
         For a field or a mesh. A ball touches a face at one place only: a face is a body, or members that join without a
         corner around the balls.
@@ -328,36 +328,36 @@ class Surface(Validated):
         raise NotImplementedError
 
     def common(self) -> dict[str, Any]:
-        """The arguments of every surface but its rotation: its laws, and how it moves, where it is open and when."""
+        """Return all arguments common to surfaces except the rotation: laws, motion, openings and `present`."""
         return {one.name: getattr(self, one.name) for one in fields(Surface) if one.name != "rotation"}
 
     def rooms_of_balls(self) -> "tuple[Any, ...]":
-        """The rooms that balls meet: for each the surfaces around it."""
+        """Return the rooms that balls meet: for each the surfaces around it."""
         return self.rooms
 
     def is_foam(self) -> bool:
-        """Whether particles are inside of many bodies, not outside of them."""
+        """Whether particles are inside many bodies, not outside them."""
         return False
 
     # --- Pictures, and random points ---
 
     def enclosing_box(self) -> Box:
-        """A box (lower, upper) around a solid or a cavity; infinite where it is unbounded."""
+        """Return a box (lower, upper) around a solid or a cavity; infinite where it is unbounded."""
         return (replace(self, side="inside") if self.is_solid() else self).bounds()  # type: ignore[call-arg]
 
     def enclosed(self, across: int | None) -> float | None:
-        """The volume within its wall [m^3], with the axis `across` a plane through the origin the area in that [m^2].
+        """Return the volume within its wall [m^3], or with the axis `across` a plane the area in this plane [m^2].
 
-        None where no closed form is known, and where it has no end.
+        The plane goes through the origin. None where no closed form is known, or where the volume is unbounded.
         """
         return None
 
     def radius_of_ball(self) -> float | None:
-        """The radius of the ball that it is the surface of [m]; None where it is another shape."""
+        """The radius of the ball with this surface [m]; None for another shape."""
         return None
 
     def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
-        """The sampler of points that are uniform in its area within the bounds (lower, upper).
+        """Return the sampler of points that are uniform in its area within the bounds (lower, upper).
 
         With the axis `across` a plane they are uniform in its length in that plane.
 
@@ -367,14 +367,14 @@ class Surface(Validated):
         return list(by_lines(self, bounds, across))
 
     def filled(self) -> "Surface":
-        """A solid as the cavity of the same shape; a cavity itself."""
+        """Return a solid as the cavity of the same shape, and a cavity itself."""
         try:
             return replace(self, side="inside") if self.is_solid() else self  # type: ignore[call-arg]
         except SceneError:
             return self
 
     def level_sets(self) -> list[LevelSet]:
-        """The level set of every smooth wall, in order; for a solid with edges those of the cavity of its shape."""
+        """Return level sets of all smooth walls, in order; for a solid with edges those of the cavity of its shape."""
         whole = self.filled()
         if type(whole).phi is not Surface.phi:
             still = whole.at_rest()
@@ -382,48 +382,48 @@ class Surface(Validated):
         return [_level_set(wall) for wall in whole.walls()]
 
     def own_frame(self) -> tuple[NDArray[np.float64], dict[str, Any]]:
-        """The axes of its own frame, columns of a matrix; and the arguments that differ in that frame."""
+        """Return the axes of its own frame, columns of a matrix; and the arguments that differ in that frame."""
         return rotations.matrix(self.rotation), {}
 
     def triangulated(
         self, low: NDArray[np.float64], high: NDArray[np.float64], frame: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
-        """Its last wall as points (V, 3) and triangles (T, 3), in a box along the columns of a frame.
+        """Return its last wall as points (V, 3) and triangles (T, 3), in a box along the columns of a frame.
 
         None where a grid of phi does as well.
         """
         return None
 
     def upright(self, low: float, high: float) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
-        """The walls that stand on an outline as triangles, between two heights along its axis; None without one."""
+        """Return the walls on an outline as triangles, between two heights along its axis; None without an outline."""
         return None
 
     def corner_lines(self, low: float, high: float) -> list[NDArray[np.float64]]:
-        """The lines (k, 3) that stand on the corners of an outline between two heights."""
+        """Return the lines (k, 3) on the corners of an outline between two heights."""
         return []
 
     def plane_curves(self, across: int) -> list[NDArray[np.float64]] | None:
-        """Its curves (k, 3) in the plane across an axis; None where these are found on a grid."""
+        """Return its curves (k, 3) in the plane across an axis; None where they are found on a grid."""
         return None
 
     def halves(self) -> NDArray[np.float64] | None:
-        """Half of the extent (n, 3) [m] of each of many bodies along its own axes; None where it has others."""
+        """Return half of the extent (n, 3) [m] of each of many bodies along its own axes; None for other axes."""
         return None
 
     # --- In words ---
 
     def beyond(self) -> str:
-        """The word for the side that is not admissible."""
+        """Return the word for the side that is not admissible."""
         return "inside" if self.is_solid() else "outside"
 
     def admissible(self, phi: float) -> str:
-        """The text that says which side is admissible, for a point with this phi that is on the other one."""
+        """Return the text that says which side is admissible, for a point with this phi on the other side."""
         if self.is_solid():
             return f"admissible is its outside, where phi is 0 or more, and phi = {phi:.6g} there"
         return f"admissible is its inside, where phi is 0 or less, and phi = {phi:.6g} there"
 
     def lids(self, across: int) -> list[float]:
-        """How far walls across an axis are from the origin [m]: along this axis balls in a plane must fit."""
+        """Return the distances [m] of walls across an axis from the origin: balls in a plane must fit between them."""
         walls = ((wall, wall.flat_normal()) for wall in self.walls_of_balls(0.0))
         return [
             -wall.distance(Vec(0.0, 0.0, 0.0))
@@ -436,7 +436,7 @@ class Surface(Validated):
         return self.is_solid() or not self.is_convex
 
     def extent(self) -> float:
-        """The distance from the origin within which the surface lies [m]; of an unbounded one its particular points."""
+        """Distance from the origin within which the surface lies [m]; for an unbounded one its particular points."""
         raise NotImplementedError
 
     def is_unturned_by(self, axis: Vector, center: Vector) -> bool:
@@ -444,7 +444,7 @@ class Surface(Validated):
         return False
 
     def turning_center(self, axis: Vector) -> Vector | None:
-        """A centre about which a rotation about this axis leaves the surface where it is; None without one."""
+        """Return a centre about which a rotation about this axis leaves the surface where it is; None without one."""
         center: Vector | None = getattr(self, "center", None)
         return center if center is not None and self.is_unturned_by(axis, center) else None
 
@@ -453,22 +453,22 @@ class Surface(Validated):
         return np.asarray(side_sign(getattr(self, "side", "inside")) * self.phi(points, 0.0) <= 0.0)
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
-        """The implicit function at points (3, N): below 0 inside, 0 on the surface, above 0 outside; shape (N,).
+        """Return the implicit function at points (3, N): below 0 inside, 0 on the surface, above 0 outside; shape (N,).
 
-        Where the surface moves, it is that of a time [s].
+        A surface that moves is taken at `time` [s].
         """
         rows = self._own_rows(points, time)
-        # Where a formula has no value it is NaN, which is outside.
+        # Where a formula has no value, phi is NaN, which counts as outside.
         with np.errstate(all="ignore"):
             return np.asarray(np.maximum.reduce([wall.phi(rows) for wall in self.walls()]))
 
     def gradient(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
-        """Gradient of phi at points (3, N); shape (3, N). On an edge it is that of one of the parts."""
+        """Return the gradient of phi at points (3, N); shape (3, N). On an edge it is that of one of the parts."""
         found = self._own_gradient(points, time)
         return found if self.motion is None else motions.pose(self.motion, time).turned(found)
 
     def _own_gradient(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
-        """That gradient in the frame in which the surface is given."""
+        """Return the gradient of phi in the frame in which the surface is given."""
         rows = self._own_rows(points, time)
         with np.errstate(all="ignore"):
             parts = [slopes_of(wall, rows) for wall in self.walls()]
@@ -478,9 +478,9 @@ class Surface(Validated):
     def reaching_outside(
         self, points: NDArray[np.float64], radius: NDArray[np.float64], time: float = 0.0
     ) -> NDArray[np.float64]:
-        """How far balls at points (3, N), with their radii (N,), reach out of the admissible side (N,) [m].
+        """Return how far balls at points (3, N), with their radii (N,), reach out of the admissible side (N,) [m].
 
-        Below 0 within, and not a number where they are nowhere.
+        The value is below 0 within, and NaN where the place of a ball is NaN.
         """
         rows = self._own_rows(points, time)
         with np.errstate(all="ignore"):
@@ -490,12 +490,12 @@ class Surface(Validated):
     def lost(self, points: NDArray[np.float64], time: float) -> NDArray[np.bool_]:
         """Whether balls with their centres at points (3, N) are beyond walls that they meet from both sides.
 
-        The distance from other walls says on which side a ball is.
+        The distance from other walls determines on which side a ball is.
         """
         return np.zeros(points.shape[1], np.bool_)
 
     def _own_rows(self, points: ArrayLike, time: float) -> Vec:
-        """Points of the scene in the frame in which the surface is given."""
+        """Return points of the scene in the frame in which the surface is given."""
         rows = _rows(points)
         if self.motion is None:
             return rows
@@ -504,7 +504,7 @@ class Surface(Validated):
 
 
 def _level_set(wall: Any) -> LevelSet:
-    """The level set of a wall as kernels take it."""
+    """Return the level set of a wall from its record for kernels."""
     return (
         lambda points: np.broadcast_to(wall.phi(vec(points.T)), len(points)),
         lambda points: np.ascontiguousarray(slopes_of(wall, vec(points.T)).T),
@@ -512,7 +512,7 @@ def _level_set(wall: Any) -> LevelSet:
 
 
 def slopes_of(wall: Any, rows: Vec) -> NDArray[np.float64]:
-    """The gradient of phi of a wall as kernels take it, at points, (3, N)."""
+    """Return the gradient of phi, from the record of a wall for kernels, at points, (3, N)."""
     return np.array(np.broadcast_arrays(*wall.gradient(rows), rows.x)[:3])
 
 
@@ -523,17 +523,17 @@ def is_on_axis(point: Vector, axis: Vector, center: Vector) -> bool:
 
 
 def is_along(direction: Vector, axis: Vector) -> bool:
-    """Whether a unit vector is along the axis, another one, or against it."""
+    """Whether a unit vector is parallel to the unit vector `axis`, in either sense."""
     return bool(np.abs(np.cross(direction, axis)).max() <= TILT)
 
 
 def volume_of(opening: Surface | Opening) -> Surface:
-    """The volume of an opening, present while that is open."""
+    """Return the volume of an opening, present while the opening is open."""
     return replace(opening.surface, present=opening.times) if isinstance(opening, Opening) else opening
 
 
 def held_opening(opening: Surface | Opening, held: motions.Placed) -> Surface | Opening:
-    """An opening where a run has moved its wall."""
+    """Return an opening where a run has moved its wall."""
     if isinstance(opening, Opening):
         return replace(opening, surface=replace(opening.surface, motion=held))
     return replace(opening, motion=held)
@@ -558,7 +558,7 @@ def side_sign(side: str) -> float:
 
 
 def rotated_box(rotation: Any, box: Box, center: Vector) -> Box:
-    """Bounds of a box that is rotated about `center`; an axis along which it has an end at most is open."""
+    """Return bounds of a box rotated about `center`; an axis along which the box lacks one of its ends is open."""
     if rotation is None:
         return box
     matrix, (low, high) = rotations.matrix(rotation), np.array(box)
@@ -571,24 +571,24 @@ def rotated_box(rotation: Any, box: Box, center: Vector) -> Box:
 
 
 def extents(axes: NDArray[np.float64], semi_axes: Any) -> Vector:
-    """Half extents along x, y, z of an ellipsoid; an infinite semi-axis makes a cylinder of it."""
+    """Return half extents along x, y, z of an ellipsoid; with an infinite semi-axis it is a cylinder."""
     tilts = np.where(abs(axes) > TILT, axes, 0.0)
     x, y, z = (math.hypot(*(n * a for n, a in zip(row, semi_axes, strict=True) if n)) for row in tilts.tolist())
     return x, y, z
 
 
 def shown(point: Any, digits: int = 4) -> str:
-    """A point as errors write it, with so many digits."""
+    """Return a point as errors write it, with `digits` digits."""
     return f"({', '.join(f'{part:.{digits}g}' for part in point)})"
 
 
 def farthest(point: Vector) -> float:
-    """The largest coordinate of a point."""
+    """Return the largest magnitude of a coordinate of a point."""
     return max(map(abs, point))
 
 
 def box_around(center: Vector, half: Vector, side: str) -> Box:
-    """Bounds of the cavity of a body with these half extents; a solid bounds nothing."""
+    """Return bounds of the cavity of a body with these half extents; the bounds of a solid are infinite."""
     if side == "outside":
         return UNBOUNDED
     (cx, cy, cz), (hx, hy, hz) = center, half

@@ -1,6 +1,6 @@
-"""Vessels of several parts: where a particle is admissible in any of them (`Union`), or in all (`Intersection`).
+"""Vessels of several parts: a particle is admissible in any of them (`Union`), or in all (`Intersection`).
 
-Nested ones are flattened: what is admissible is a union of *rooms*, each the intersection of the admissible sides of
+Nested ones are flattened: the admissible side is a union of *rooms*, each the intersection of the admissible sides of
 surfaces. The *gap* of a part is its phi with the sign of its side, that of a room the largest gap of its surfaces, and
 that of the whole the least gap of its rooms.
 """
@@ -29,21 +29,21 @@ from .surface import Place as Place
 if TYPE_CHECKING:
     from .presence.seams import Seam
 
-# Most rooms: each is compiled into the kernels.
+# The most rooms: each is compiled into the kernels.
 _MOST_ROOMS = 64
 
 
 @dataclass(frozen=True, repr=False)
 class Joined(Surface):
-    """What `Union` and `Intersection` have in common."""
+    """The common part of `Union` and `Intersection`."""
 
     parts: Any = field(metadata={"key": "part"})
     side: str = "inside"
 
-    # The operation of the gaps of parts, and where the wall of one is: inside of the others (1), or outside (-1).
+    # The operation on the gaps of parts, and the place of the wall of one: inside the others (1), or outside (-1).
     _of_gaps: ClassVar[Any] = None
     wall_in_others: ClassVar[float] = 1.0
-    # In a scene, by how much its rooms overlap where they have a face in common [m]; None: they touch.
+    # In a scene, the overlap of its rooms where they have a face in common [m]; None: they touch.
     reach: ClassVar[float | None] = None
 
     def __post_init__(self) -> None:
@@ -98,13 +98,13 @@ class Joined(Surface):
 
     @cached_property
     def _places_in_rooms(self) -> tuple[dict[Surface, Place], ...]:
-        """The surfaces of every room, and the places of the parts that they are."""
+        """Return the surfaces of every room, and the places of the parts that they come from."""
         rooms: list[dict[Surface, Place]] = []
         for room in self._rooms(self.side == "outside"):
             rooms.append({})
             for surface, place in room:
                 rooms[-1].setdefault(surface, place)
-        # What parts have in common may be nothing.
+        # The parts may have no volume in common.
         rooms = [room for room in rooms if may_have_volume(tuple(room))] if len(rooms) > 1 else rooms
         if self.reach is None:
             return tuple(rooms)
@@ -114,7 +114,7 @@ class Joined(Surface):
 
     @cached_property
     def seams(self) -> "list[Seam]":
-        """The faces that its rooms have in common, and that are no walls."""
+        """Return the faces that its rooms have in common, and that are no walls."""
         return [seam for seam in self._touching if seam.together]
 
     @cached_property
@@ -144,7 +144,7 @@ class Joined(Surface):
         return made
 
     def _rooms(self, turned: bool) -> list[tuple[tuple[Surface, Place], ...]]:
-        """The surfaces and places of rooms, or of those of what is not admissible."""
+        """Return the surfaces and places of the rooms of the admissible side, or of the other side."""
         parts = [handed_down(self, part) for part in self.parts]
         given = [one._rooms(turned ^ (one.side == "outside")) if isinstance(one, Joined)
                  else [((other_side(one) if turned else one, ()),)] for one in parts]  # fmt: skip
@@ -165,7 +165,7 @@ class Joined(Surface):
         return tuple(itertools.chain(*self.rooms))
 
     def walls(self) -> tuple[Any, ...]:
-        """The walls of these."""
+        """Return the walls of these rooms."""
         return tuple(itertools.chain(*(surface.walls() for surface in self.surfaces())))
 
     def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
@@ -217,7 +217,7 @@ class Joined(Surface):
         return self.bounds()
 
     def area_samples(self, bounds: Region, across: int | None) -> list[AreaSample]:
-        # One that several rooms have is drawn once.
+        # A wall of several rooms is drawn once.
         parts = dict.fromkeys(self.surfaces())
         return [_of_part(part, one) for part in parts for one in part.area_samples(bounds, across)]
 
@@ -228,9 +228,9 @@ class Joined(Surface):
         return all(part.is_unturned_by(axis, center) for part in self.parts)
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> Floats:
-        """The least gap of the parts of a union, the largest one of an intersection, at points (3, N); shape (N,).
+        """Return the least gap of the parts of a union, the largest of an intersection, at points (3, N); shape (N,).
 
-        Where the surface moves, it is that of a time [s].
+        A surface that moves is taken at `time` [s].
         """
         rows = self._own_points(points, time)
         return np.asarray(self._of_gaps.reduce(self._gaps(rows, time)))
@@ -245,7 +245,7 @@ class Joined(Surface):
         return found
 
     def _gaps(self, rows: Floats, time: float) -> Floats:
-        """The gaps of the parts: nowhere where one has no value, and all over where its walls are not there."""
+        """Return the gaps of the parts: infinite where one has no value, -infinite where the walls of it are absent."""
         gaps = np.array([side_of(part) * part.phi(rows, time) for part in self.parts])
         there = np.array([part.is_there(time) for part in self.parts])
         return np.where(there.reshape(-1, *[1] * (gaps.ndim - 1)), np.where(np.isnan(gaps), math.inf, gaps), -math.inf)
@@ -259,10 +259,10 @@ class Joined(Surface):
 class Union(Joined):
     """A vessel of several parts, which may overlap: a particle in one of them is in the vessel.
 
-    A wall is there where it is in no other part. Parts that have a flat or a round face in common, to 4 roundings of
+    A part has no wall inside another part. Parts that have a flat or a round face in common, to 4 roundings of
     the size, are one room, and parts that do not touch separate ones. An `Opening` in a common face is a door: the rest
-    of the face is a wall of no thickness then. Each part has its laws, temperature, motion and openings; what is given
-    to the union holds for the parts that leave it out.
+    of the face is a wall of no thickness then. Each part has its laws, temperature, motion and openings; arguments of
+    the union hold for the parts that leave them out.
 
     In a scene file: kind = "union" and [[surface.part]] tables.
 
@@ -285,16 +285,16 @@ class Union(Joined):
 
 @dataclass(frozen=True, repr=False)
 class Intersection(Joined):
-    """What several parts have in common, as one of the parts of a `Union`, or of a scene.
+    """The volume that several parts have in common, as one of the parts of a `Union`, or of a scene.
 
-    The surfaces of a scene are an intersection already. Each part has its laws, temperature, motion and openings; what
-    is given to the intersection holds for the parts that leave it out.
+    The surfaces of a scene are an intersection already. Each part has its laws, temperature, motion and openings;
+    arguments of the intersection hold for the parts that leave them out.
 
     In a scene file: kind = "intersection" and [[surface.part]] tables.
 
     Args:
         parts: surfaces of any kinds, also unions and intersections; each with its own `side`.
-        side: "inside", or "outside": the space around what they have in common, a solid.
+        side: "inside", or "outside": the space around their common volume, a solid.
 
     Raises:
         SceneError: no part, or parts that have no volume in common.
@@ -313,7 +313,7 @@ class Intersection(Joined):
 
 
 def _of_part(part: Surface, sample: AreaSample) -> AreaSample:
-    """A sample of a part as far as it is on that part: what goes on beyond it may be a wall of another."""
+    """Return a sample of a part without points off that part: a wall beyond it may be one of another part."""
 
     def draw(random: Random, n: int) -> Floats:
         points = sample.draw(random, n)
@@ -330,7 +330,7 @@ def _moves(part: Surface) -> bool:
 
 
 def nodes_of(surface: Surface) -> Iterator[tuple[Place, Surface]]:
-    """A surface, at no place, and all parts of it and of its parts, each as given, with its place."""
+    """Yield a surface, at no place, and all its parts, and their parts, as given, each with its place."""
     yield (), surface
     for k, part in enumerate(surface.parts):
         for place, one in nodes_of(part):
@@ -338,7 +338,7 @@ def nodes_of(surface: Surface) -> Iterator[tuple[Place, Surface]]:
 
 
 def part_at(surface: Surface, place: Place) -> Surface:
-    """The part at a place of a surface, with what is given to the whole; at no place the surface itself."""
+    """Return the part at a place of a surface, with the arguments of the whole; at no place the surface itself."""
     for k in place:
         surface = handed_down(surface, surface.parts[k])
     return surface
@@ -348,7 +348,7 @@ def part_at(surface: Surface, place: Place) -> Surface:
 
 
 def _require_alone(whole: Joined) -> None:
-    """Raise a `SceneError` for a surface that is known only where its own walls keep particles, or is many bodies."""
+    """Raise a `SceneError` for a surface of many bodies, or known only where its own walls keep particles."""
     for surface in whole.surfaces():
         if surface.is_field:
             raise SceneError(
@@ -368,7 +368,7 @@ def _require_alone(whole: Joined) -> None:
 
 
 def _require_room(whole: Joined) -> None:
-    """Raise a `SceneError` where a part, or the whole, has no volume."""
+    """Raise a `SceneError` if a part, or the whole, has no volume."""
     for k, part in enumerate(whole.parts):
         if not part.parts and not has_volume((part,)):
             raise SceneError(f"parts[{k}] must have a volume, got {part!r:.200}, of which no point is admissible")

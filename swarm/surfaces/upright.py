@@ -1,7 +1,7 @@
-"""Walls that stand upright on a plane: turned ones with normals in it to round-off, made to be in it exactly.
+"""Walls that stand upright on a plane: their normals are in the plane up to round-off, and are corrected to be in it.
 
 In a scene of two dimensions a wall that leans by round-off would send particles off the plane, and walls that disperse
-them make more of that at every impact.
+particles increase the deviation at every impact.
 """
 
 from typing import Any
@@ -29,13 +29,13 @@ class Upright(Rotated):
 
 
 class UprightY(Upright):
-    """The same across y."""
+    """A turned surface, with all normals in the plane across y."""
 
     across = 1
 
 
 class UprightZ(Upright):
-    """The same across z."""
+    """A turned surface, with all normals in the plane across z."""
 
     across = 2
 
@@ -44,7 +44,7 @@ _KINDS = Upright, UprightY, UprightZ
 
 
 def upright(wall: Any, across: int | None) -> Any:
-    """A wall, or what it is made of, in a scene with a plane across an axis; None: without a plane."""
+    """Return a wall, or its parts, upright on the plane across an axis; None: the scene has no plane."""
     if across is None:
         return wall
     if isinstance(wall, Rotated):

@@ -16,7 +16,7 @@ from ..kernel.vector import ZERO, Vec, dot
 # The number of impacts with which a law is tried before a run, and the speed into the wall that counts as 0, relative
 # to the speeds of an impact.
 _TRIED, _ROUND_OFF = 64, 1e-15
-# Where it is booked what a law takes or gives.
+# The observables that may count the energy that a law takes or gives.
 BOOKS = ("heat", "dissipated")
 
 
@@ -58,7 +58,7 @@ class WallLaw(Record):
     (`shortest_flight` of `Impact`) slides or rests, by the restitution and the friction of the surface, and meets no
     law of this wall meanwhile.
 
-    What a law changes of the energy is heat that the wall gives, in the observable "wall_heat"; with `book =
+    A change of the energy by a law is heat that the wall gives, in the observable "wall_heat"; with `book =
     "dissipated"` in the class it is lost, in "dissipated_energy". A law that changes the square of the speed relative
     to the wall by less than 1e-12 of it keeps the speed to the last digit.
 
@@ -81,39 +81,39 @@ class WallLaw(Record):
     book = "heat"
 
     def leave(self, v, n, u, random, mass):
-        """The velocity after an impact [m/s], away from the wall, or a `Leave`.
+        """Return the velocity after an impact [m/s], away from the wall, or a `Leave`.
 
         Args:
             v: the velocity before it [m/s].
-            n: the unit normal of the wall, into the vessel: n.(v - u) < 0, and n.(what is returned - u) >= 0. In a
-                scene with a plane all vectors are along that, and so must be what is returned.
+            n: the unit normal of the wall, into the vessel: n.(v - u) < 0, and n.(w - u) >= 0 of the returned w.
+                In a scene with a plane all vectors are along the plane, and the returned one must be too.
             u: the velocity of the wall [m/s].
             random: random numbers of this impact and law: `random.uniform(k)` in (0, 1), `random.normal(k)`, which
                 takes k and k + 1, and `random.exponential(k)`, for k = 0, 1, ...; the same for any threads and any
                 resume. 2 k and 2 k + 1 together cost as much as one. `random.diffuse(n, random.uniform(k), k + 1)` is
                 a unit vector of the cosine law, `random.across` the axis across the plane of the scene, or None.
-            mass: of the particle [kg]. Of a body it is what its contact point has along the normal, 1/(n K n), with
-                the inverse mass K of the body there; v is such across the normal that mass |v - u|^2/2 is the energy
+            mass: of the particle [kg]. Of a body it is the effective mass at its contact point along the normal,
+                1/(n K n) with the inverse mass K there; v is such across the normal that mass |v - u|^2/2 is the energy
                 that an impulse at this point can change.
         """
         raise NotImplementedError
 
     def check(self, name: str) -> None:
-        """Raise a `SceneError` where a field of this law, which is `name` of its surface, is out of its range."""
+        """Raise a `SceneError` if a field of this law, which is `name` of its surface, is out of its range."""
 
 
 def mirrored(v, n, u):
-    """The velocity with which an elastic wall sends a particle off."""
+    """Return the velocity with which a particle leaves an elastic wall."""
     return v - 2.0 * dot(v - u, n) * n
 
 
 def leave_of(given):
-    """What a law has returned as a `Leave`."""
+    """Return the result of a law as a `Leave`."""
     return given if isinstance(given, Leave) else Leave(given)
 
 
 def checked_laws(name: str, given: Any) -> tuple[Any, ...]:
-    """Laws as kernels take them, their fields as floats; a str is the name that a file has of a law."""
+    """Return laws with their fields as floats; a str is the name of a law in a file."""
     if isinstance(given, (WallLaw, str)) or not isinstance(given, (tuple, list)):
         raise SceneError(
             f"{name} must be a list of WallLaw, such as [swarm.Lambert()], in a scene file {name.rpartition('.')[2]} = "
@@ -148,7 +148,7 @@ def _checked(name: str, law: Any) -> Any:
 
 
 def _try(name: str, law: Any) -> None:
-    """Raise a `SceneError` where a law sends a particle into the wall, or gives no velocity."""
+    """Raise a `SceneError` if a law sends a particle into the wall, or returns no velocity."""
     try:
         tries = list(tries_of(law))
     except Exception as error:
@@ -165,7 +165,7 @@ def _try(name: str, law: Any) -> None:
 
 
 def why_wrong(given: Any, v: Vec, n: Vec, u: Vec, moves: bool = False) -> str:
-    """What is wrong with what a law returns, as the end of a sentence; "" where nothing is."""
+    """Return the error in the result of a law, as the end of a sentence; "" if it is right."""
     after, stays, wait = leave_of(given)
     is_known = isinstance(stays, (bool, np.bool_)) and not wait < 0.0 and not math.isnan(wait)
     if not is_known:
@@ -182,7 +182,7 @@ def why_wrong(given: Any, v: Vec, n: Vec, u: Vec, moves: bool = False) -> str:
 
 
 def tries_of(law: Any, across: int | None = None, axis: Any = None) -> Iterator[tuple[Vec, Vec, Any]]:
-    """Some trials of a law: (velocity before, normal into the vessel, what it returns); in a plane across an axis."""
+    """Yield trials of a law: (velocity before, normal into the vessel, its result); in a plane across an axis."""
     rng = np.random.default_rng(0)
     for k in range(_TRIED):
         rows = rng.normal(size=(2, 3))
@@ -207,7 +207,7 @@ def may_end(law: Any) -> bool:
 
 
 def sentence_of(law: Any, given: Any, v: Vec, n: Vec, u: Vec) -> str:
-    """What a law has returned for which arguments."""
+    """Return the sentence that names the result of a law and its arguments."""
     return f"{law} returned {_shown(given)} for v = {_as_text(v)}, n = {_as_text(n)} and u = {_as_text(u)}"
 
 

@@ -1,4 +1,4 @@
-"""All walls of a scene in one record, and the methods of one of them by its number."""
+"""All walls of a scene in one record, and the methods of one wall by its number."""
 
 import math
 from collections.abc import Iterable
@@ -23,7 +23,7 @@ class Field(Record):
         return self._replace(members=self.members.grown(radius))
 
     def count(self):
-        """Their number."""
+        """Return the number of its walls."""
         return self.members.count()
 
 
@@ -32,17 +32,17 @@ class Listed(Field):
 
 
 class Following(Record):
-    """A wall that moves with the wall before it, as both are of one surface."""
+    """A wall that moves with the wall before it, because both are of one surface."""
 
     body: Any
 
     def grown(self, radius):
-        """What the centre of a ball meets."""
+        """Return the wall that the centre of a ball meets."""
         return self._replace(body=self.body.grown(radius))
 
 
 def _with_number(every, number):
-    """The one of the `numbered` walls that has this number, or the last one, as a tuple of one."""
+    """Return the `numbered` wall that has this number, or the last one, as a tuple of one."""
     for k, (first, wall) in enumerate(every):
         if number < first + wall.count() if isinstance(wall, Field) else number == first:
             return every[k : k + 1]
@@ -50,7 +50,7 @@ def _with_number(every, number):
 
 
 def _alike(every):
-    """The `numbered` walls in groups of those that follow one another and are of one kind."""
+    """Return the `numbered` walls in groups: consecutive walls of one kind."""
     found: tuple[Any, ...] = ()
     for one in every:
         joins = len(found) > 0 and not isinstance(one[1], Field) and is_alike(found[-1][-1][1], one[1])
@@ -59,7 +59,7 @@ def _alike(every):
 
 
 class Touched(Record):
-    """The first wall that a step is in contact with, or -1, and how many there are."""
+    """The first wall that a step is in contact with, or -1, and the number of walls in contact with it."""
 
     wall: float
     number: float
@@ -75,7 +75,7 @@ class Walls(Record):
     # For each union, for each of its rooms, for each wall of the room: 1/the steepness of its level. See rooms.py.
     unions: tuple[Any, ...] = ()
     slack: Any = None  # a distance that is round-off where rooms meet [m]
-    inset: Any = None  # where rooms touch, how far inside of a wall a particle is put that meets it [m]
+    inset: Any = None  # where rooms touch, the distance inside a wall at which a particle that meets it is placed [m]
 
     if TYPE_CHECKING:
 
@@ -85,19 +85,19 @@ class Walls(Record):
     accelerate = False
 
     def grown(self, radius):
-        """The walls that the centre of a ball of this radius meets."""
+        """Return the walls that the centre of a ball of this radius meets."""
         return self._replace(each=tuple(wall.grown(radius) for wall in self.each))
 
     def foot(self, number, r, radius):
-        """The point at which a ball with its centre at r touches a wall; `self` are the walls grown by its radius."""
+        """Return the point at which a ball centred at r touches a wall; `self` is the walls grown by its radius."""
         return r + radius * self.unit_normal(number, r)
 
     def at(self, remaining):
-        """The walls when so much of the frame is left [s]; where none moves, the same walls."""
+        """Return the walls when the time `remaining` of the frame is left [s]; if none moves, the same walls."""
         return self
 
     def during(self, remaining, after):
-        """The walls over a step; at its start and end so much of the frame is left [s]."""
+        """Return the walls over a step; at its start `remaining` is left of the frame [s], at its end `after`."""
         return self
 
     def in_steps(self):
@@ -116,10 +116,10 @@ class Walls(Record):
         """Whether lanes look at flights to some of these walls."""
         return any(wall.looked_at for wall in self.each)
 
-    # --- Their numbers and rows ---
+    # --- Numbers and rows ---
 
     def numbered(self):
-        """(number, wall) of each wall, and (number of its first wall, field) of each field."""
+        """Return (number, wall) of each wall, and (number of its first wall, field) of each field."""
         found: tuple[Any, ...] = ()
         number = 0.0
         for wall in self.each:
@@ -128,28 +128,28 @@ class Walls(Record):
         return found
 
     def total(self):
-        """The number of walls, with all members of the fields."""
+        """Return the number of walls, with all members of the fields."""
         return self.count_in_fields() + float(sum(not isinstance(wall, Field) for wall in self.each))
 
     def fields(self):
-        """`numbered` of the fields."""
+        """Return `numbered` of the fields."""
         return tuple((number, wall) for number, wall in self.numbered() if isinstance(wall, Field))
 
     def others(self):
-        """The walls that are in no field."""
+        """Return the walls that are in no field."""
         return self._replace(each=tuple(wall for wall in self.each if not isinstance(wall, Field)))
 
     def alone(self, each):
-        """A record with these walls alone, without unions."""
+        """Return a record with only the walls `each`, without unions."""
         return self._replace(each=each, unions=(), slack=None, inset=None)
 
     def shared(self):
-        """`numbered` of the walls that are in no union: these hold for all particles."""
+        """Return `numbered` of the walls that are in no union: these hold for all particles."""
         every = self.numbered()
         return every[: len(every) - sum(len(room) for union in self.unions for room in union)]
 
     def joined(self):
-        """The rooms of each union, and their walls: (number, wall, 1/the steepness of its level) each."""
+        """Return the rooms of each union, and their walls: (number, wall, 1/the steepness of its level) each."""
         every = self.numbered()
         k = len(self.shared())
         found: tuple[Any, ...] = ()
@@ -163,18 +163,18 @@ class Walls(Record):
         return found
 
     def count_in_fields(self):
-        """The number of walls of its fields."""
+        """Return the number of walls of its fields."""
         return sum((wall.count() for wall in self.each if isinstance(wall, Field)), 0.0)
 
     def length(self):
-        """The number of rows, one for a field: a constant for the compiler if none is `Listed`."""
+        """Return the number of rows, one for a field: a constant for the compiler if none is `Listed`."""
         rows = 0
         for wall in self.each:
             rows += int(wall.count()) if isinstance(wall, Listed) else 1
         return rows
 
     def row(self, number):
-        """The row of the impulse and heat of this wall; the members of a field share one."""
+        """Return the row of the impulse and heat of this wall; the members of a field share one."""
         stops = tuple(first + wall.count() for first, wall in self.fields() if not isinstance(wall, Listed))
         row = int(number - stops[-1]) + len(stops) if stops else int(number)
         for k, stop in reversed(tuple(enumerate(stops))):
@@ -184,7 +184,7 @@ class Walls(Record):
     # --- Near a point: walls of no field, members in the cell of the point, and walls of one room of each union ---
 
     def numbers_near(self, r):
-        """The numbers of the walls near a point, in an array of the calling function."""
+        """Return the numbers of the walls near a point, in an array of the calling function."""
         near = len(self.shared()) - len(self.fields())
         for rooms in self.joined():
             near = self.count_in_owner(rooms, r) + near
@@ -213,7 +213,7 @@ class Walls(Record):
 
     @outlined
     def count_in_owner(self, rooms, r):
-        """The number of walls of the room of a union to which a point belongs."""
+        """Return the number of walls of the room of a union to which a point belongs."""
         owner, count = owner_of(self, rooms, r), 0
         for i, room in enumerate(rooms):
             count = select(i == owner, len(room), count)
@@ -221,14 +221,14 @@ class Walls(Record):
 
     @outlined
     def first_in_owner(self, rooms, r):
-        """The number of the first wall of that room."""
+        """Return the number of the first wall of the room of a union to which a point belongs."""
         owner, first = owner_of(self, rooms, r), 0.0
         for i, room in enumerate(rooms):
             first = select(i == owner, room[0][0], first)
         return first
 
     def until_others(self, r, v):
-        """The time from which on a straight flight may meet walls that are not near its start."""
+        """Return the time from which on a straight flight may meet walls that are not near its start."""
         soonest = math.inf
         for _number, field in reversed(self.fields()):
             soonest = min(field.members.until_next_cell(r, v), soonest)
@@ -237,15 +237,15 @@ class Walls(Record):
     # --- Of one wall ---
 
     def of(self, number, neutral, ask, *given):
-        """ask(wall, *given) of the wall with this number.
+        """Return ask(wall, *given) for the wall with this number.
 
-        For any other number the answer is that of the last wall; a caller without a wall ignores it. `neutral` is any
-        value of the type of the answer, for a scene without walls.
+        For any other number the result is that of the last wall; a caller without a wall ignores it. `neutral` is any
+        value of the type of the result, for a scene without walls.
         """
         answer, every = None, self.numbered()
-        # A kernel may know the number of a wall, but not how many a field has before it.
+        # A number may be a constant of a kernel while the number of walls in a field before it is not.
         knows = is_known(number) and len(every) > 1 and is_known(every[-1][0])
-        # Walls of one kind are asked once, so that a kernel for many of them is little longer than for one.
+        # Consecutive walls of one kind share one call, so that a kernel for many of them is little longer than for one.
         for alike in reversed(_alike(_with_number(every, number) if knows else every)):
             first, one = alike[-1]
             if isinstance(one, Field):
@@ -261,7 +261,7 @@ class Walls(Record):
     # --- Of all ---
 
     def shortest_time_scale(self):
-        """The shortest `time_scale` of all walls [s]."""
+        """Return the shortest `time_scale` of all walls [s]."""
         shortest = math.inf
         for wall in reversed(self.each):
             one = wall.members if isinstance(wall, Field) else wall
@@ -269,19 +269,19 @@ class Walls(Record):
         return shortest
 
     def chord_sweeps(self):
-        """The most steps of `chord_improve` that any wall takes: a constant for the compiler."""
+        """Return the most steps of `chord_improve` that any wall takes: a constant for the compiler."""
         each = tuple(wall.members.like if isinstance(wall, Field) else wall for wall in self.each)
         return max((0, *(wall.chord_sweeps for wall in each)))
 
     def keeps(self, number, r):
-        """Whether the wall with this number is there at a place at which a step along it ends."""
+        """Whether the wall with this number is present at a place at which a step along it ends."""
         found = True
         for first, field in self.fields():
             found = field.members.keeps(number - first, r) & found
         return found
 
     def outside(self, number, r):
-        """Whether a point is outside any wall but this one (-1: any at all)."""
+        """Whether a point is outside any wall except this one (-1: outside any wall)."""
         found = False
         for first, wall in self.shared():
             if isinstance(wall, Field):
@@ -309,7 +309,7 @@ class Walls(Record):
         return found
 
     def touched(self, r, p):
-        """The walls that a step with free displacement p is in contact with."""
+        """Return the walls that a step with free displacement p is in contact with."""
         found = Touched(-1.0, 0.0)
         for k, wall in reversed(tuple(enumerate(self.each))):
             before = wall.level_of(wall.inner(r))
@@ -319,7 +319,7 @@ class Walls(Record):
         return found
 
 
-# The methods of one wall by its number, and any value of the type of the answer.
+# The methods of one wall by its number, and any value of the type of the result.
 _ASKED = {
     **dict.fromkeys(("velocity", "acceleration", "carry", "mean_velocity", "displacement", "swept"), ZERO),
     **dict.fromkeys(("unit_normal", "project", "push", "discrete_gradient", "step_normal", "chord_normal"), ZERO),
@@ -344,12 +344,12 @@ for _name, _neutral in _ASKED.items():
 
 
 def all_walls(surfaces: Iterable[Any]) -> Walls:
-    """The walls of surfaces, in their order."""
+    """Return the walls of surfaces, in their order."""
     return Walls(tuple(wall for surface in surfaces for wall in surface.walls()))
 
 
 def penetration(walls, r):
-    """Largest distance outside, max(g, 0)/|grad g|, over all walls."""
+    """Return the largest distance outside, max(g, 0)/|grad g|, over all walls."""
     deepest = 0.0
     for _number, wall in reversed(walls.shared()):
         distance = wall.members.deepest_in_cell(r) if isinstance(wall, Field) else wall.distance(r)
@@ -361,7 +361,7 @@ def penetration(walls, r):
 
 
 def _out_of_all(rooms, r):
-    """Distance outside of the nearest room of a union."""
+    """Return the distance outside of the nearest room of a union."""
     least = math.inf
     for room in rooms:
         farthest = 0.0

@@ -1,1 +1,1 @@
-"""What the centres of balls meet where that is of another kind than the wall: edges are round, tips are elsewhere."""
+"""Walls for the centres of balls that are of another kind than the wall itself: edges are round, tips are moved."""

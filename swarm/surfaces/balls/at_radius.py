@@ -1,4 +1,4 @@
-"""What all walls have in common that the centre of a ball meets, with the distance as their phi."""
+"""The common part of all walls that the centre of a ball meets, with the distance as their phi."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -6,7 +6,7 @@ from .. import contract
 
 
 class AtRadius(contract.Smooth):
-    """The places at the field `radius` from a wall: phi is the distance from these, and its gradient a unit vector."""
+    """The places at the field `radius` from a wall: phi is the distance from these places, with a unit gradient."""
 
     if TYPE_CHECKING:
         radius: Any

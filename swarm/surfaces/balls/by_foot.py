@@ -1,16 +1,16 @@
 """Walls of a smooth phi that balls meet: phi is how far a ball reaches beyond its wall, by the foot of the normal.
 
-With f = side phi, below 0 where particles may be, let f'' be 2 m at most in any direction. What a place p says is then
+With f = side phi, below 0 on the admissible side, let f'' be at most 2 m in any direction. A place p then gives
 f(p + s) <= f(p) + grad f.s + m |s|^2, so that a ball around any centre y has no wall in it up to the root of
     f + grad f.(y - p) + m |y - p|^2 + |grad f + 2 m (y - p)| d + m d^2.
-The foot z of y, where y = z - k grad f(z) and f(z) = 0, says that the wall is as far as |y - z|, and so that nothing of
-it is nearer, where 2 m k <= 1: up to |grad f|/(2 m), which is no more than the radius of curvature there, and for a
-quadric is the smallest one. Deeper, or before a foot is found, places on the way to it say a lower bound, with k up to
-1/(2 m) so large a one as the least such radius. So no foot needs to be searched for: the one that is found is nearest,
-or the wall is farther than any ball is large.
+At the foot z of y, y = z - k grad f(z) and f(z) = 0. It proves that the wall is at the distance |y - z|, and that no
+part of it is nearer, where 2 m k <= 1: up to |grad f|/(2 m), which is at most the radius of curvature there, and for
+a quadric the smallest one. Deeper, or before a foot is found, places on the way to it give a lower bound, with k up
+to 1/(2 m), as large as the least such radius. So no foot needs to be searched for: the foot that is found is nearest,
+or the wall is farther than the radius of any ball.
 
-Where that bound of f'' holds within a distance from the wall only, no place says more than half of this: the lines from
-places within it to the nearest point of the wall, which these bounds are about, stay where it holds.
+Where the bound of f'' holds within a distance from the wall only, no place gives more than half of this distance: the
+lines from places within it to the nearest point of the wall stay where the bound holds.
 """
 
 import math
@@ -27,18 +27,18 @@ from .foot_hit import first_impact, matrix
 
 # Newton's steps to a foot; near it each one doubles the digits. The last one is shorter than this part of the distance.
 _SWEEPS, _LAST = 24, 1e-8
-# A step this short, in parts of a place, is round-off.
+# A step this short, as a part of the place, is round-off.
 _STILL = 8.0 * EPSILON
-# Of the largest k that has a foot known to be nearest: where the matrix of a step has an inverse.
+# The part of the largest k for which the foot is known to be nearest: the matrix of a step has an inverse up to it.
 _MOST = 1.0 - 1e-6
-# From so many radii on a place by itself says how far the wall is at least.
+# From this number of radii on, the bound by a place is used as the distance of the wall.
 _FAR = 2.0
-# Of the room that is left to the smallest radius of curvature, where H has a bound: up to this part of it.
+# The bound of H holds up to this part of the distance that is left to the smallest radius of curvature.
 _PART = 0.5
 
 
 class Foot(NamedTuple):
-    """The foot of a place: how far it is, a lower bound where it is not `sure`, and the unit normal there, outwards."""
+    """The foot of a place: its distance, a lower bound if it is not `sure`, and the unit normal there, outwards."""
 
     away: Any
     normal: Vec
@@ -48,7 +48,7 @@ class Foot(NamedTuple):
 
 
 class ByFoot(AtRadius):
-    """What is so far within the admissible side of a wall `body`."""
+    """The places at the distance `radius` within the admissible side of a wall `body`."""
 
     body: Any
     radius: float  # of the ball
@@ -56,19 +56,19 @@ class ByFoot(AtRadius):
     bend: float  # the smallest radius of curvature that is certain
     low: Vec  # corners of a box around the wall
     high: Vec
-    known: float  # a distance up to twice which from the wall m is certain
+    known: float  # m is certain up to twice this distance from the wall
 
     side = 1.0
 
     @outlined
     def foot(self, r):
-        """The `Foot` of a place, by Newton's method for r = z - k grad f(z) and f(z) = 0; k is at most 1/(2 m)."""
+        """Return the `Foot` of a place, by Newton's method for r = z - k grad f(z), f(z) = 0; k is at most 1/(2 m)."""
         body, side = self.body, self.side_of_body()
         p = self.within(r)
         f, n = side * body.phi(p), side * body.gradient(p)
         beside = norm(r - p)
         away, size, first = max(_free(self, r, p, f, n), beside), norm(n), f
-        # From there so far along the normal
+        # From there this way along the normal
         ahead = rise_time(f, 0.5 * size, self.most)
         ahead = select((ahead < math.inf) & (f < 0.0), ahead, -f / select(size > TINY, size, 1.0))
         z = self.within(p + (ahead / select(size > TINY, size, 1.0)) * n)
@@ -119,11 +119,11 @@ class ByFoot(AtRadius):
         return select(near > _FAR * self.radius, near, self.foot(r).away) - self.radius
 
     def farthest_push(self):
-        # Where it is as round as the ball at the most
+        # Where its curvature is at most that of the ball
         return 2.0 * self.radius
 
     def hessian(self, r):
-        # With M = I - k grad grad f a foot moves by T = M^-1 - M^-1 n n^T M^-1/(n.M^-1 n) of what its place moves by.
+        # With M = I - k grad grad f a foot moves by T = M^-1 - M^-1 n n^T M^-1/(n.M^-1 n) times the move of its place.
         found = self.foot(r)
         n = found.normal
         c = inverse(matrix(self, found.place, found.share))
@@ -161,12 +161,12 @@ class ByFoot(AtRadius):
         return most, max(most, 0.5 / select(short > 0.0, short, 1.0)), reach
 
     def at_least(self, r):
-        """What a place by itself says: how far the wall is at least, and the unit vector to where it may be."""
+        """Return the bound by a place: the least distance of the wall, and the unit vector to where it may be."""
         p = self.within(r)
         side = self.side_of_body()
         f, n = side * self.body.phi(p), side * self.body.gradient(p)
         size = norm(n)
-        # Of all places of the box this is the nearest.
+        # The nearest of all places of the box.
         near = max(_certain(self, r, f, _free(self, r, p, f, n)), norm(r - p))
         return near, n * (1.0 / select(size > TINY, size, 1.0))
 
@@ -183,18 +183,18 @@ class ByFoot(AtRadius):
         return x | y | ((r.z > high.z + far) & (v.z >= 0.0)) | ((r.z < low.z - far) & (v.z <= 0.0))
 
     def within(self, r):
-        """The nearest place of the box."""
+        """Return the nearest place of the box."""
         low, high = self.low, self.high
         return Vec(_clipped(r.x, low.x, high.x), _clipped(r.y, low.y, high.y), _clipped(r.z, low.z, high.z))
 
     def holds(self, r):
-        """Whether the wall may be at a place: it is in the box."""
+        """Whether the wall may be at a place: the box contains the place."""
         low, high = self.low, self.high
         x, y = (r.x >= low.x) & (r.x <= high.x), (r.y >= low.y) & (r.y <= high.y)
         return x & y & (r.z >= low.z) & (r.z <= high.z)
 
     def side_of_body(self):
-        """+1 of a cavity, -1 of a solid."""
+        """+1 for a cavity, -1 for a solid."""
         return self.body.side
 
 
@@ -203,14 +203,14 @@ def _clipped(x, low, high):
 
 
 def _free(wall, y, p, f, n):
-    """How far the wall is from y at least, by what f and its gradient are at p."""
+    """Return the least distance of the wall from y, by f and its gradient at p."""
     e, m = y - p, wall.most
     level = f + dot(n, e) + m * square(e)
     return select(level < 0.0, rise_time(level, 0.5 * norm(n + (2.0 * m) * e), m), 0.0)
 
 
 def _certain(wall, y, f, away):
-    """What of such a bound is certain, up to `known`, or what the body says of the place, where f there is below 0."""
+    """Return the certain part of this bound, up to `known`, or where f is below 0 the bound by the body."""
     if wall.known < math.inf:
         return max(min(away, wall.known), select(f < 0.0, wall.body.clearance(y), 0.0))
     return away

@@ -17,19 +17,19 @@ from .rounded import Rounded
 
 # Newton's steps to a foot and to a hit; near both each one doubles the digits.
 _SWEEPS, _STEPS = 60, 40
-# What is no denominator, as a part of the square semi-axis.
+# The least denominator, as a part of the square of the semi-axis.
 _POLE = 1e-30
-# Of the room that is left to the smallest radius of curvature, where H has a bound: up to this part of it.
+# The bound of H holds up to this part of the distance that is left to the smallest radius of curvature.
 _PART = 0.5
 
 
 @outlined
 def _foot(egg, r):
-    """The signed distance of a point outside of the ellipsoid, and the unit normal of that at its foot."""
+    """Return the signed distance of a point outside the ellipsoid, and the unit normal of the ellipsoid at its foot."""
     y, a2 = r - egg.center, egg.squares
     least = min(a2.x, min(a2.y, a2.z))
     size = times(a2, times(y, y))
-    # Each of the terms of |x/a|^2 is 1 at most.
+    # Each term of |x/a|^2 is at most 1.
     t = max(math.sqrt(size.x) - a2.x, max(math.sqrt(size.y) - a2.y, math.sqrt(size.z) - a2.z))
     whole = 0.0
     for _sweep in range(_SWEEPS):
@@ -58,7 +58,7 @@ def _part(t, a2):
 
 
 class EggCavity(AtRadius):
-    """What is so far inside of an ellipsoid, in its principal frame: convex as that is, so that it is left once."""
+    """The places at the distance `radius` inside an ellipsoid, in its principal frame: convex, so it is left once."""
 
     center: Vec
     squares: Vec  # of the semi-axes
@@ -77,7 +77,7 @@ class EggCavity(AtRadius):
         return self.foot(r)[1]
 
     def hessian(self, r):
-        # With C = 1/(t + a^2), k = n.C n and m = C n - k n: twice it is |a n| times
+        # With C = 1/(t + a^2), k = n.C n and m = C n - k n: twice H is |a n| times
         # C - n C n^T - C n n^T + k n n^T + t m m^T/(1 - t k), which is 1/(R + d) across n on a sphere.
         away, n = self.foot(r)
         size = math.sqrt(dot(self.squares, times(n, n)))
@@ -104,11 +104,11 @@ class EggCavity(AtRadius):
         return _leaving(self, r, v), True
 
     def falling_hit(self, r, v, pull):
-        # A parabola may leave what is convex and come back: planes at feet prove too little.
+        # A parabola may leave a convex volume and come back: planes at feet prove too little.
         return self.by_foot().falling_hit(r, v, pull)
 
     def by_foot(self):
-        """The same wall as those of any smooth phi."""
+        """Return the same wall as a wall of any smooth phi."""
         a2 = self.squares
         a = Vec(1.0 / a2.x, 1.0 / a2.y, 1.0 / a2.z)
         body = ConvexQuadric(self.center, a, None, 1.0, 1.0, 1.0)
@@ -116,7 +116,7 @@ class EggCavity(AtRadius):
         return ByFoot(body, self.radius, largest(a), self.bend, low, high, math.inf)
 
     def hessian_bounds(self, r):
-        # 1/(2 (R - d)) at most, where d is how far inside of the ellipsoid, and R the radius of curvature
+        # 1/(2 (R - d)) at most, with the distance d inside the ellipsoid and the radius of curvature R
         inside = max(-self.foot(r)[0], 0.0)
         room = self.bend - inside
         reach = select(room > 0.0, _PART * room, EPSILON * self.bend)
@@ -125,7 +125,7 @@ class EggCavity(AtRadius):
 
 
 class EggSolid(Rounded):
-    """Around a solid ellipsoid, in its principal frame."""
+    """The outside of a solid ellipsoid, in its principal frame."""
 
     center: Vec
     squares: Vec
@@ -136,7 +136,7 @@ class EggSolid(Rounded):
 
 @outlined
 def _leaving(egg, r, v):
-    """When a straight flight leaves the cavity: from where it leaves the ellipsoid back to the planes at the feet."""
+    """Return when a straight flight leaves the cavity: from the exit of the ellipsoid back to planes at the feet."""
     y, a2 = r - egg.center, egg.squares
     inverse = Vec(1.0 / a2.x, 1.0 / a2.y, 1.0 / a2.z)
     w, u = times(inverse, y), times(inverse, v)

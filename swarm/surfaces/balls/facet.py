@@ -12,12 +12,12 @@ from ..fields.many import field_of
 from ..fields.members import Members
 from .rounded import Rounded, part_within
 
-# A flight through the edge between two triangles is through one of them: by this part each is larger then.
+# A flight through the edge between two triangles passes one of them: each is larger by this part for this test.
 _SEAM = 1e-9
 
 
 class RoundTriangle(Rounded):
-    """A triangle of a mesh: balls are outside of what is within the radius from it."""
+    """A triangle of a mesh, grown by the radius of the balls."""
 
     corner: Vec
     first: Vec  # from there to the other corners
@@ -28,7 +28,7 @@ class RoundTriangle(Rounded):
         d, a, b = r - self.corner, self.first, self.second
         n, third = cross(a, b), b - a
         n2 = square(n)
-        # Between its edges, seen along the normal
+        # Between its edges, as seen along the normal
         u, v = dot(cross(d, b), n), dot(cross(a, d), n)
         within = (n2 > 0.0) & (u >= 0.0) & (v >= 0.0) & (u + v <= n2)
         across = (dot(d, n) / select(n2 > 0.0, n2, 1.0)) * n
@@ -39,12 +39,12 @@ class RoundTriangle(Rounded):
         edge = either(square(edge) <= square(other), edge, other)
         e = either(within, across, edge)
         away = norm(e)
-        # On the triangle itself either side is as near.
+        # On the triangle itself both sides are equally near.
         there = away > 0.0
         return away, either(there, e, n) * (1.0 / select(there, away, select(n2 > 0.0, math.sqrt(n2), 1.0)))
 
     def passed_by(self, r, move):
-        """How far a move that leads through the triangle ends behind its plane [m], -1 where it does not."""
+        """Return how far a move that leads through the triangle ends behind its plane [m], or -1 for any other move."""
         d, a, b = r - self.corner, self.first, self.second
         n = cross(a, b)
         n2 = square(n)
@@ -57,7 +57,7 @@ class RoundTriangle(Rounded):
 
 
 def triangles_of_balls(corners: Floats, largest: float) -> Members:
-    """The triangles with these corners (T, 3, 3) as balls meet them, with radii of at most the largest one [m]."""
+    """Return the triangles with corners (T, 3, 3) as balls meet them, with radii of at most the largest one [m]."""
     a, b, c = np.moveaxis(corners, 1, 0)
     table = aligned_copy(np.concatenate([a, b - a, c - a, np.zeros((len(a), 1))], axis=1))
     zero = Vec(0.0, 0.0, 0.0)

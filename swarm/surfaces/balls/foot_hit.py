@@ -1,13 +1,13 @@
 """The time of impact of a ball on a wall of a smooth phi: Newton's method for time and foot at once, and its proof.
 
-With f and m as in by_foot.py, a place p bounds f around it: f(p + s) <= f(p) + grad f.s + m |s|^2. So a ball of the
-radius R around p + w holds no point of the wall if
+With f and m as in by_foot.py, a place p bounds f around it: f(p + s) <= f(p) + grad f.s + m |s|^2. So a ball of
+radius R around p + w contains no point of the wall if
     f + grad f.w + m |w|^2 + R sqrt(|grad f|^2 - 4 m f) - m R^2 <= 0.
 The centres for which this holds fill a ball for m > 0, and a half-space for m = 0. A flight is in it until the root of
 a parabola or, in a fall, of a quartic. The bound of the place of the impact reaches up to the impact.
 
-Newton's method may begin anywhere and may find any impact. That impact is the first one if a chain of places bounds
-the flight up to it. If the chain does not get there, as where a flight grazes, safe steps go on (march.py).
+Newton's method may begin anywhere and may find any impact. This impact is the first one if a chain of places bounds
+the flight up to it. If the chain ends before it, as where a flight grazes, safe steps follow (march.py).
 """
 
 import math
@@ -21,11 +21,11 @@ from ..curvature import applied, inverse
 from ..time_of_impact import march
 from ..time_of_impact.course import Fall, Quartic, close, first_rise, rise_time
 
-# Places of a chain, Newton's steps, and the last one in parts of a radius: each one doubles the digits.
+# The most places of a chain, Newton's steps, and the last step as a part of the radius: each doubles the digits.
 _PLACES, _SWEEPS, _LAST = 24, 8, 1e-8
 # How far behind the bound an impact may be, in roundings of the place, and still be the impact at the bound.
 _SAME = 16.0 * EPSILON
-# The sine of the angle of an impact at least: at less its time has few digits.
+# The least sine of the angle of an impact: at a smaller one its time has few digits.
 _STEEP = 1e-4
 # Newton's method begins again where the bound ends within this many radii.
 _CLOSE = 0.1
@@ -65,7 +65,7 @@ def first_impact(wall, r, v, pull):
             found = _impact(wall, (r, v, pull), t + free, _touched(wall, sure, after))
         if found.speed > 0.0:
             until = _free(wall, found.foot, y, w, pull)
-            # As deep as round-off of the place, at most
+            # At most as deep as round-off of the place
             same = _SAME * total(absolute(y) + absolute(found.foot.place)) / found.speed
             if t <= found.time <= t + until + same:
                 return found.time, True
@@ -78,7 +78,7 @@ def first_impact(wall, r, v, pull):
 
 
 def _here(wall, y, v, pull):
-    """The bound at a place of a flight, near a wall that of its foot; and how long the flight meets no wall by it."""
+    """Return the bound at a place of a flight, near a wall that of its foot; and how long it keeps the flight free."""
     p = wall.within(y)
     sure, near = _sure(wall, p), norm(y - p)
     if wall.known < math.inf:
@@ -94,7 +94,7 @@ def _here(wall, y, v, pull):
 
 
 def _sure(wall, p):
-    """The bound by a place."""
+    """Return the bound by a place."""
     f, n = wall.side_of_body() * wall.body.phi(p), wall.side_of_body() * wall.body.gradient(p)
     left = square(n) - 4.0 * wall.most * f
     return Sure(p, f, n, math.sqrt(select(left > 0.0, left, 0.0)))
@@ -102,7 +102,7 @@ def _sure(wall, p):
 
 @outlined
 def _free(wall, sure, y, v, pull):
-    """How long a ball at y meets no wall, by the bound of a place; 0 where the bound does not hold y."""
+    """Return how long a ball at y meets no wall, by the bound of a place; 0 where the bound does not cover y."""
     m, w, size = wall.most, y - sure.place, norm(sure.n)
     c = sure.f + dot(sure.n + m * w, w) + wall.radius * (sure.root - m * wall.radius)
     if 2.0 * m * wall.radius > sure.root or c > _SAME * size * total(absolute(y) + absolute(sure.place)):
@@ -112,20 +112,20 @@ def _free(wall, sure, y, v, pull):
     if pull2 == 0.0:
         time = rise_time(c, b, a2)
     else:
-        # How long it takes to cross the ball of centres
+        # The time to cross the ball of centres
         across = abs(sure.root / (2.0 * m)) if m != 0.0 else 0.0
         window = 2.0 * across / math.sqrt(square(v) + across * math.sqrt(pull2)) if m != 0.0 else math.inf
         level = Quartic(c, b, a2 + 0.5 * dot(steep, pull), m * dot(v, pull), 0.25 * m * pull2, window)
         time, _rises = first_rise(Fall(level, close(window), False))
     if wall.known < math.inf:
-        # From a place on the wall the bound is of ways as long as this.
+        # From a place on the wall the bound holds for ways up to this length.
         reach = max(4.0 * wall.known - wall.radius - norm(w), 0.0)
         time = min(time, march.time_to_travel(norm(v), math.sqrt(pull2), reach))
     return time
 
 
 def _touched(wall, sure, y):
-    """Where a ball at y touches the edge of the bound by a place."""
+    """Return where a ball at y touches the edge of the bound by a place."""
     u = sure.n + (2.0 * wall.most) * (y - sure.place)
     size = norm(u)
     return y + (wall.radius / select(size > TINY, size, 1.0)) * u
@@ -135,7 +135,7 @@ def _touched(wall, sure, y):
 def _impact(wall, flight, t, z):
     """A `TouchOfWall` near a time and a place: f(z) = 0, z - k grad f(z) = y(t), k |grad f(z)| = R by Newton's method.
 
-    By the last two of these grad f.(z - y) = f + R |grad f| to first order, which is an equation for the time alone.
+    With the last two, grad f.(z - y) = f + R |grad f| to first order, which is an equation for the time alone.
     """
     (r, v, pull), body, side, radius = flight, wall.body, wall.side_of_body(), wall.radius
     z = wall.within(z)
@@ -158,7 +158,7 @@ def _impact(wall, flight, t, z):
         f, n = side * body.phi(z), side * body.gradient(z)
         size = norm(n)
         if is_last:
-            # What is left of the time is that of the square of the last step.
+            # The rest of the time is of the order of the square of the last step.
             w = v + time * pull
             rate, d = dot(n, w), z - (r + time * (v + (0.5 * time) * pull))
             if rate > _STEEP * size * norm(w) and wall.holds(z):

@@ -1,9 +1,9 @@
 """The walls of a union of several rooms that balls meet, by the nearest place of their faces, edges and tips.
 
-A face is a wall of a room. Where it is in no other room it is a wall of the union, and *seen*. An edge is where walls
-of two rooms cross; balls turn about it. A tip is a place where walls of three rooms meet. The *foot* of a ball is the
-place of a face or an edge that is nearest to it. On an edge Newton's method finds it: each step goes to the place
-nearest to the ball on the line in both tangent planes. Faces that edges join are one wall; so are faces in one place.
+A face is a wall of a room. A part of it that is in no other room is a wall of the union, and *seen*. An edge is where
+walls of two rooms cross; balls turn about it. A tip is a place where walls of three rooms meet. The *foot* of a ball is
+the nearest place of a face or an edge. On an edge Newton's method finds it: each step goes to the place
+nearest to the ball on the line in both tangent planes. Faces that edges join are one wall; so are coincident faces.
 
 A soft ball at such a wall is pushed from its nearest place, by a gap g = R - d at the distance d. Two faces of a room
 may meet in a corner around the balls and be of one wall, as two sides of a tunnel are, joined by the rim of its mouth.
@@ -11,11 +11,11 @@ A ball in such a corner has a spring at each face: the gap of the wall is the ro
 
     g^2 = g(nearest)^2 + sum over corners of (g(one)^2 - g(corner)^2)                                             (1)
 
-where `one` is the farther of the two faces, and `corner` its nearest place. The distance from a face is that from all
-its places and its edges. So g has no jump where a ball leaves the tunnel: there both faces are as far as the corner.
+where `one` is the farther of the two faces, and `corner` its nearest place. The distance from a face is the distance
+from all its places and edges. So g has no jump where a ball leaves the tunnel: both faces are as far as the corner.
 
 While all of a hard ball is within one room, its flight meets nothing. Where it leaves the room, it meets the wall of
-that, if its foot there is seen. Any other flight takes safe steps. Where the foot on a face is seen, it is free until
+this room, if its foot there is seen. Any other flight takes safe steps. If the foot on a face is seen, it is free until
 it meets the parallel surface. Near an edge it is free for a time that follows from the curvature of the edge. A hidden
 face is not met before its foot may be seen. A hidden edge is not met before its foot may be seen or is as near as a
 radius.
@@ -36,11 +36,11 @@ from ..time_of_impact.flights import Hit
 
 # The most steps of Newton's method to an edge. A step no longer than this part of a place, its round-off, is the last.
 _SWEEPS, _STILL = 60, 4.0 * EPSILON
-# Edges are found up to so many radii away.
+# Edges are found up to this number of radii away.
 _FAR = 4.0
-# Walls are parallel where the square of the sine is below this.
+# Walls are parallel if the square of the sine is below this.
 _PARALLEL = 1e-18
-# Flat walls are parallel where the square of the cosine is above this.
+# Flat walls are parallel if the square of the cosine is above this.
 FLAT, _ALIGNED = (PlaneNumbers, SlabNumbers), 1.0 - 1e-14
 
 
@@ -49,8 +49,8 @@ class RoomFace(Record):
 
     wall: Any
     rooms: Any  # the number of the room, twice
-    number: float  # that of the wall, of all walls of all rooms
-    round: Any = None  # the smallest radius of curvature [m]; None where it depends on the place
+    number: float  # the number of the wall among all walls of all rooms
+    round: Any = None  # the smallest radius of curvature [m]; None if it depends on the place
     slope: float = 0.0  # its steepest decrease along the wall, a length per length
 
 
@@ -63,12 +63,12 @@ class RoomEdge(Record):
     bend: float = math.inf  # the smallest radius of curvature [m]
 
     def bend_at(self, x):
-        """The radius of curvature of the edge at a place, from those of both walls along it; in Python."""
+        """Return the radius of curvature of the edge at a place, by those of both walls along it; in Python."""
         n, m = outward(self.one, x), outward(self.other, x)
         along = cross(n, m)
         sine2 = square(along)
         if not sine2 > 0.0:
-            # Where walls touch they have no edge.
+            # Walls that touch have no edge.
             return math.inf
         along = along * (1.0 / math.sqrt(sine2))
         a, b = (wall.outward_acceleration(x, along, ZERO) for wall in (self.one, self.other))
@@ -84,9 +84,9 @@ class RoomSide(Record):
 
 
 class RoomCorner(Record):
-    """Where two faces of one room, and of one wall, join around the balls."""
+    """The place where two faces of one room, and of one wall, join around the balls."""
 
-    line: RoomEdge  # where they cross
+    line: RoomEdge  # their line of intersection
     one: RoomSide
     other: RoomSide
     ends: Any  # places where the line ends at another room
@@ -122,7 +122,7 @@ class JoinedFaces(Smooth):
     corners: Any  # `RoomCorner`s
     radius: Any  # of a ball [m]
     slack: float  # round-off of a place [m]
-    most: float  # farther than anything [m]
+    most: float  # a distance larger than any other [m]
 
     side = 1.0
 
@@ -172,7 +172,7 @@ class JoinedFaces(Smooth):
         arrives = (not is_first or step == 0.0) and march.travelled(norm(w), norm(pull), step) <= 2.0 * room
         if arrives and not is_first:
             away, place = nearest(self, p)
-            # By more than round-off: an edge bends more than its samples say.
+            # By more than round-off: the curvature of an edge may exceed that of its samples.
             if away < self.radius - room and dot(place - p, w) > 0.0:
                 return march.SafeStep(t, 0.0, -1.0, 0.0)
         return march.SafeStep(t, step, select(arrives, 0.0, -1.0), -1.0)
@@ -188,13 +188,13 @@ class JoinedFaces(Smooth):
 
 @kernel
 def touched(walls, points, radius, found):
-    """How far balls at points (3, N) with their radii (N,) reach beyond any of the walls, into `found`."""
+    """Write how far balls at points (3, N) with their radii (N,) reach beyond any of the walls into `found`."""
     for i in range(points.shape[1]):
         found[i] = deepest_in(walls, column(points, 0, i), radius[i])
 
 
 def deepest_in(walls, r, radius):
-    """How far a ball reaches beyond any of the walls."""
+    """Return how far a ball reaches beyond any of the walls."""
     deepest = -math.inf
     for wall in walls:
         deepest = max(deepest, wall.grown(radius).distance(r))
@@ -203,7 +203,7 @@ def deepest_in(walls, r, radius):
 
 @outlined
 def nearest(wall, r):
-    """(distance, place) of the place of a wall that is nearest to r; edges beyond `_FAR` radii are left out."""
+    """Return (distance, place) of the place of a wall nearest to r; edges beyond `_FAR` radii are not considered."""
     best, place = wall.most, r
     for face in wall.faces:
         best, place = _or_on_face(wall, face, r, (best, place))
@@ -215,7 +215,7 @@ def nearest(wall, r):
 
 
 def _or_on_face(wall, face, r, known):
-    """(distance, place) of the nearest place of a face, or of one that is known and no farther."""
+    """Return (distance, place) of the nearest place of a face, or of a known place that is no farther."""
     best, place = known
     foot = r - face.wall.distance(r) * outward(face.wall, r)
     away = norm(foot - r)
@@ -224,7 +224,7 @@ def _or_on_face(wall, face, r, known):
 
 
 def _or_on_edge(wall, edge, r, known):
-    """(distance, place) of the nearest place of an edge, or of one that is known and no farther."""
+    """Return (distance, place) of the nearest place of an edge, or of a known place that is no farther."""
     foot = crossing(edge.one, edge.other, r, _FAR * wall.radius)
     on_both = max(abs(edge.one.distance(foot)), abs(edge.other.distance(foot))) <= wall.slack
     best, place = known
@@ -234,7 +234,7 @@ def _or_on_edge(wall, edge, r, known):
 
 
 def _or_at(tip, r, known):
-    """(distance, place) of a tip, or of a place that is known and no farther."""
+    """Return (distance, place) of a tip, or of a known place that is no farther."""
     best, place = known
     away = norm(tip - r)
     better = away < best
@@ -242,13 +242,13 @@ def _or_at(tip, r, known):
 
 
 def _towards(place, r, away):
-    """The unit vector from r to a place at this distance."""
+    """Return the unit vector from r to a place at this distance."""
     return (place - r) * (1.0 / select(away > 0.0, away, 1.0))
 
 
 @outlined
 def _pressed(wall, r):
-    """(gap, its gradient) of a soft ball."""
+    """Return (gap, its gradient) of a soft ball."""
     away, place = nearest(wall, r)
     gap, n = wall.radius - away, _towards(place, r, away)
     if gap > 0.0:
@@ -266,7 +266,7 @@ def _pressed(wall, r):
 
 
 def _by_depth(wall, r0, r1):
-    """The mean of the gradients at both ends of a step, by their depths; alike where neither end is in the wall."""
+    """Return the mean of the gradients at both ends of a step, weighted by depth; equal weights if both are outside."""
     (g0, n0), (g1, n1) = _pressed(wall, r0), _pressed(wall, r1)
     a, b = max(g0, 0.0), max(g1, 0.0)
     is_in = a + b > 0.0
@@ -276,7 +276,7 @@ def _by_depth(wall, r0, r1):
 
 @outlined
 def _in_corner(wall, corner, r):
-    """(distance, place) of the farther one of both faces of a corner, and of the corner itself."""
+    """Return (distance, place) of the farther of the two faces of a corner, and of the corner itself."""
     best, place = _or_on_edge(wall, corner.line, r, (wall.most, r))
     for end in corner.ends:
         best, place = _or_at(end, r, (best, place))
@@ -286,7 +286,7 @@ def _in_corner(wall, corner, r):
 
 
 def _on_side(wall, side, r, known):
-    """(distance, place) of the nearest place of a face with its edges, no farther than a place that is known."""
+    """Return (distance, place) of the nearest place of a face with its edges, no farther than a known place."""
     best, place = _or_on_face(wall, side.face, r, known)
     for edge in side.edges:
         best, place = _or_on_edge(wall, edge, r, (best, place))
@@ -295,7 +295,7 @@ def _on_side(wall, side, r, known):
 
 @outlined
 def at_least(wall, r):
-    """A lower bound of the distance to the nearest place, also from afar, where `nearest` leaves edges out."""
+    """Return a lower bound of the distance to the nearest place, also from afar, where `nearest` ignores edges."""
     best = wall.most
     for face in wall.faces:
         best = min(best, _at_least_to(wall, face, r))
@@ -307,24 +307,24 @@ def at_least(wall, r):
 
 
 def _at_least_to(wall, face, r):
-    """The same of a face. Where its foot is hidden, the seen part is beside it, perhaps without an edge there."""
+    """Return this bound for a face. If its foot is hidden, the seen part is beside it, maybe without an edge there."""
     away, n, flat = face.wall.distance(r), outward(face.wall, r), isinstance(face.wall, FLAT)
     depth = max(hidden(wall.rooms, face.rooms, r - away * n, n if flat else ZERO, wall.slack), 0.0)
     return math.sqrt(away * away + depth * depth) if flat else max(abs(away), depth - abs(away))
 
 
 def outward(wall, r):
-    """The unit vector along the gradient of the distance from a wall, also far from the wall."""
+    """Return the unit vector along the gradient of the distance from a wall, also far from the wall."""
     return wall.side * wall.gradient(r)
 
 
 def is_seen(rooms, own, place, slack):
-    """Whether a place of a face or an edge is in its own rooms and in no other one."""
+    """Whether a place of a face or an edge is in its own rooms and in no other room."""
     return hidden(rooms, own, place, ZERO, slack) <= slack
 
 
 def gap_of(rooms, place):
-    """How far a place is outside of all rooms, at least; below 0 in one of them."""
+    """Return the least distance of a place outside all rooms; below 0 in one of them."""
     least = math.inf
     for room in rooms:
         gap = -math.inf
@@ -336,10 +336,10 @@ def gap_of(rooms, place):
 
 @outlined
 def hidden(rooms, own, place, n, slack):
-    """A lower bound of the distance from a place of a face or an edge to where that is seen; 0 or less if it is seen.
+    """Return a lower bound of the distance from a place of a face or an edge to the seen part; at most 0 if it is seen.
 
-    A place that moves along a flat face with the normal n stays inside of the walls that are parallel to it, but not of
-    those in the plane of the face, where round-off says on which side it is.
+    A place that moves along a flat face with the normal n stays inside walls that are parallel to it, but not inside
+    walls in the plane of the face, where round-off decides on which side it is.
 
     Args:
         rooms: the walls of each room of the union.
@@ -367,7 +367,7 @@ def hidden(rooms, own, place, n, slack):
 
 @outlined
 def crossing(one, other, y, far):
-    """The place where two walls cross that is nearest to y; y itself where one of them is not nearer than `far`."""
+    """Return the place nearest to y where two walls cross; y itself if one of them is not nearer than `far`."""
     x = y
     if max(abs(one.distance(y)), abs(other.distance(y))) < far:
         for _sweep in range(_SWEEPS):
@@ -387,41 +387,41 @@ def crossing(one, other, y, far):
 
 # --- Flights of hard balls -------------------------------------------------------------------------------
 
-# Where the edge next to a ball is not found, the ball goes this part of its radius. Where an edge is hidden, the ball
-# goes at least this part of the way of its foot: the radius of curvature of an edge is a bound from samples.
+# Where the edge next to a ball is not found, the ball moves by this part of its radius. Where an edge is hidden, the
+# ball moves by at least this part of the way of its foot: the radius of curvature of an edge is a bound from samples.
 _UNFOUND, _LEAST = 0.05, 0.125
-# A ball that touches a wall of a room is within it, with so many round-offs of a place.
+# A ball that touches a wall of a room is within it, up to this number of round-offs of a place.
 _WITHIN = 8.0
 
 
 class AtInstant(Record):
-    """A flight at an instant; the methods return times during which it surely stays clear of something [s]."""
+    """A flight at an instant; the methods return times during which it surely stays clear of walls and edges [s]."""
 
     r: Vec
     v: Vec
     pull: Vec
 
     def place(self, t):
-        """The place after a time."""
+        """Return the place after a time."""
         return self.r + t * (self.v + (0.5 * t) * self.pull)
 
     def until_wall(self, grown):
-        """The time to the parallel surface of a wall."""
+        """Return the time to the parallel surface of a wall."""
         time, _meets = _wall_hit(grown, self)
         return time
 
     def until_rim(self, rim):
-        """The time to a ball around an edge."""
+        """Return the time to a ball around an edge."""
         return march.safe_step(rim, self.r, self.v, self.pull, 0.0)[2]
 
     def until_gone(self, way):
-        """The least time in which it goes so far."""
+        """Return the least time in which the flight covers `way`."""
         return march.time_to_travel(norm(self.v), norm(self.pull), way)
 
 
 @outlined
 def _wall_hit(grown, flight):
-    """The time to the parallel surface of a wall, and whether an `AtInstant` meets it then."""
+    """Return the time to the parallel surface of a wall, and whether an `AtInstant` meets it then."""
     if flight.pull.x == 0.0 and flight.pull.y == 0.0 and flight.pull.z == 0.0:
         return grown.first_hit(flight.r, flight.v)
     return grown.falling_hit(flight.r, flight.v, flight.pull)
@@ -457,7 +457,7 @@ class Hidden(rising.Ahead):
 
 @outlined
 def _in_rooms(rooms, radius, slack, flight, near):
-    """The `Hit` of a ball with a wall of the room that it stays in the longest; the wall is -1 if it meets none there.
+    """Return the `Hit` of a ball with a wall of the room in which it stays longest; the wall is -1 if it meets none.
 
     `near` is round-off of its place [m].
     """
@@ -467,7 +467,7 @@ def _in_rooms(rooms, radius, slack, flight, near):
         for wall in room:
             gap = max(gap, wall.distance(flight.r))
         if gap <= near - radius:
-            # All of the ball is within the room, of which each wall has the ball on its side.
+            # All of the ball is within the room: it is inside each wall of the room.
             first, place = Hit(math.inf, -1.0), foot
             for i, wall in enumerate(room):
                 until, there = _way_to(wall, before + float(i), radius, flight)
@@ -482,14 +482,14 @@ def _in_rooms(rooms, radius, slack, flight, near):
 
 @outlined
 def _way_to(wall, number, radius, flight):
-    """(the `Hit` with one wall, which has this number, the foot of the ball on the wall then)."""
+    """Return (the `Hit` with the wall of this number, the foot of the ball on the wall then)."""
     time, meets = _wall_hit(wall.grown(radius), flight)
     there = flight.place(select(time < math.inf, time, 0.0))
     return Hit(time, select(meets, number, -1.0)), there - wall.distance(there) * outward(wall, there)
 
 
 def _until_any(wall, flight, longest):
-    """A time, at most the longest one, during which a flight surely stays clear of all faces, edges and tips."""
+    """Return a time, at most `longest`, during which a flight surely stays clear of all faces, edges and tips."""
     step = longest
     for face in wall.faces:
         step = min(step, _until_face(wall, face, flight))
@@ -502,13 +502,13 @@ def _until_any(wall, flight, longest):
 
 @outlined
 def _until_face(wall, face, flight):
-    """A time during which a flight surely stays clear of a face."""
+    """Return a time during which a flight surely stays clear of a face."""
     p = flight.r
     away, n = face.wall.distance(p), outward(face.wall, p)
     foot = p - away * n
     along, step = n if isinstance(face.wall, FLAT) else ZERO, 0.0
     depth = hidden(wall.rooms, face.rooms, foot, along, wall.slack)
-    # A face is seen from inside of its own room alone.
+    # A face is seen only from inside its own room.
     faces = depth <= wall.slack and away <= 0.0
     if faces or away <= -wall.radius:
         step = flight.until_wall(face.wall.grown(wall.radius))
@@ -518,14 +518,14 @@ def _until_face(wall, face, flight):
         return flight.until_gone(away)
     way = _way_of_foot(_round_at(face, foot, n), face.slope, abs(away), depth)
     if isinstance(face.wall, SlabNumbers):
-        # In the middle the foot goes over to the other side.
+        # At the middle of the wall the foot moves over to the other side.
         way = min(way, face.wall.radius + away)
     return max(step, flight.until_gone(max(abs(away) - wall.radius, way)))
 
 
 @outlined
 def _until_edge(wall, edge, flight):
-    """A time during which a flight surely stays clear of an edge."""
+    """Return a time during which a flight surely stays clear of an edge."""
     p = flight.r
     least = max(abs(edge.one.distance(p)), abs(edge.other.distance(p)))
     foot = crossing(edge.one, edge.other, p, _FAR * wall.radius)
@@ -538,27 +538,27 @@ def _until_edge(wall, edge, flight):
 
 
 def _rim_of(wall, tip, p):
-    """The `Rim` of a tip: that of a straight edge with its foot at the tip."""
+    """Return the `Rim` of a tip: that of a straight edge with its foot at the tip."""
     return Rim(math.inf, tip, norm(tip - p), wall.radius)
 
 
 def _round_at(face, foot, n):
-    """The smallest radius of curvature of a face at a place with the normal n [m]."""
+    """Return the smallest radius of curvature of a face at a place with the normal n [m]."""
     if face.round is not None:
         return face.round
     along = select(abs(n.x) < 0.5, 1.0, 0.0)
     one = cross(n, Vec(along, 1.0 - along, 0.0))
     one = one * (1.0 / norm(one))
-    # One of the two curvatures of a cone is 0, so that the other one is their sum in any two directions.
+    # One of the two curvatures of a cone is 0, so that the other one is their sum in any two orthogonal directions.
     bend = abs(face.wall.outward_acceleration(foot, one, ZERO))
     bend = bend + abs(face.wall.outward_acceleration(foot, cross(n, one), ZERO))
     return select(bend > 0.0, 1.0 / select(bend > 0.0, bend, 1.0), math.inf)
 
 
 def _way_of_foot(roundness, slope, away, depth):
-    """The least way of a ball on which its foot on a wall or an edge goes by `depth`.
+    """Return the least way of a ball on which its foot on a wall or an edge moves by `depth`.
 
-    With the radius of curvature R of the wall, a ball at the distance d that goes the way w moves its foot by at most
+    With the radius of curvature R of the wall, a ball at the distance d that moves by w moves its foot by at most
     w R/(R - d - w). Along a cone R decreases by the slope times the way of the foot.
     """
     if not roundness < math.inf:
@@ -567,5 +567,5 @@ def _way_of_foot(roundness, slope, away, depth):
 
 
 def _until_seen(wall, away, way, flight):
-    """A time during which a face or an edge stays hidden or farther away than a radius; `way`: until it may be seen."""
+    """Return a time during which a face or an edge stays hidden, by the `way` until it is seen, or out of reach."""
     return flight.until_gone(max(away - wall.radius, min(way, wall.radius)))

@@ -1,4 +1,4 @@
-"""A union of several rooms, or a foam, as balls meet it: a surface of walls, each of faces that edges join."""
+"""A union of several rooms, or a foam, for balls: a surface of walls, each of faces that edges join."""
 
 import itertools
 import math
@@ -35,24 +35,24 @@ from .joined_faces import (
 )
 from .tip import TipPlane
 
-# Parts of the extent: the round-off of a place, and a distance that is larger than any other.
+# As parts of the extent: the round-off of a place, and a distance that is larger than any other.
 _SLACK, _FAR = 1e-11, 1e6
 # Where an edge only touches the wall of a third room, the place is known to the square root of the round-off.
 _TOUCHES = math.sqrt(_SLACK)
-# Edges are searched from a place in each of so many parts, in each direction, of what is in the bounds of both rooms;
+# Edges are searched from a place in each of this number of parts, along each axis, of the common bounds of two rooms;
 # the most rooms.
 _PARTS, _MOST = 3, 64
-# Of the smallest radius of curvature that is found on an edge, this part is a lower bound. It is searched from so many
-# of the places on the edge, unless it is the same at all of them, down to this part of the way to the next place.
+# This part of the smallest radius of curvature found on an edge is a lower bound. It is searched from this number of
+# places on the edge, unless it is the same at all of them, down to this part of the way to the next place.
 _ROUND, _SHARPEST, _ALIKE, _SHORTEST = 0.999, 4, 1e-6, 1e-3
-# An edge is also seen beside a place, at this many round-offs of a place from it.
+# An edge is also seen if it is seen beside a place, at this number of round-offs of a place from it.
 _BESIDE = 1e5
-# The most steps of Newton's method to a tip; one that is no longer than this round-off of a place is the last. Walls
+# The most steps of Newton's method to a tip; a step no longer than this round-off of a place is the last. Walls
 # with normals that span no more than this volume do not meet at a point.
 _SWEEPS, _STILL, _PARALLEL = 30, 4.0 * EPSILON, 1e-9
-# Of normals of walls that go on smoothly, the most that their cosine is below 1; steps onto a wall.
+# Normals of walls with a smooth transition have a cosine below 1 by at most this; steps onto a wall.
 _SMOOTH, _PROJECTIONS = 1e-9, 4
-# Of no more balls it is asked in Python how far they reach outside: a kernel takes longer to compile.
+# Up to this number of balls, the reach outside is computed in Python: compiling a kernel takes longer.
 _FEW = 100
 _KINDS = Sphere, Plane, Slab, Box, Cylinder, Cone
 
@@ -92,7 +92,7 @@ class JoinedRooms(Surface):
         return found
 
     def _gaps(self, points: ArrayLike, time: float) -> list[list[NDArray[np.float64]]]:
-        """phi of each surface of each room."""
+        """Return phi of each surface of each room."""
         rows = np.array(self._own_rows(points, time))
         return [[one.phi(rows) for one in room] for room in self.rooms_of]
 
@@ -115,14 +115,14 @@ class JoinedRooms(Surface):
 
 
 def joined_rooms_of(union: Any) -> JoinedRooms:
-    """The `JoinedRooms` of a union of several rooms, or of a foam."""
+    """Return the `JoinedRooms` of a union of several rooms, or of a foam."""
     rooms = union.rooms_of_balls()
     one, still = rooms[0][0], [[replace(one.at_rest(), openings=(), present=None) for one in room] for room in rooms]
     return JoinedRooms(rooms_of=tuple(map(tuple, still)), **one.common())
 
 
 def why_no_balls_in(union: Any) -> str | None:
-    """Why balls cannot meet a union of several rooms, or a foam, for the sentence of an error; None where they can."""
+    """Return why balls cannot meet a union of several rooms, or a foam, for the sentence of an error, or None."""
     rooms = union.rooms_of_balls()
     surfaces = [surface for room in rooms for surface in room]
     begin = f"of {len(rooms)} rooms, of which "
@@ -193,14 +193,14 @@ def _made(joined: JoinedRooms) -> list[JoinedFaces]:
 
 
 def _each(room: Any) -> Iterator[tuple[Surface, Any]]:
-    """Every wall of a room: (its surface, the wall)."""
+    """Yield every wall of a room: (its surface, the wall)."""
     for one in room:
         for wall in one.walls_of_balls(0.0):
             yield one, wall.grown(0.0)
 
 
 def _bend_of(surface: Surface, wall: Any) -> tuple[float | None, float]:
-    """The radius of curvature of a wall [m], None for a cone; and how fast it changes along the wall."""
+    """Return the radius of curvature of a wall [m], None for a cone; and how fast it changes along the wall."""
     if isinstance(surface, (Sphere, Cylinder)) and not isinstance(wall, FLAT):
         return surface.radius, 0.0
     if isinstance(surface, Cone) and not isinstance(wall, TipPlane):
@@ -209,7 +209,7 @@ def _bend_of(surface: Surface, wall: Any) -> tuple[float | None, float]:
 
 
 def _places_in(bounds: tuple[Any, ...], extent: float, slack: float) -> list[Vec]:
-    """Places in all parts of the intersection of some boxes; an empty list if that is empty."""
+    """Return places in all parts of the intersection of boxes; an empty list if it is empty."""
     low = np.clip(np.max([box[0] for box in bounds], axis=0), -extent, extent)
     high = np.clip(np.min([box[1] for box in bounds], axis=0), -extent, extent)
     if (low > high + slack).any():
@@ -220,14 +220,14 @@ def _places_in(bounds: tuple[Any, ...], extent: float, slack: float) -> list[Vec
 
 
 def _edges_of(rooms: tuple[Any, ...]) -> Iterator[tuple[RoomEdge, tuple[int, int], tuple[int, int]]]:
-    """Every pair of walls of two rooms: (the edge that it may have, (room, wall) of one, (room, wall) of the other)."""
+    """Yield every pair of walls of two rooms: (their possible edge, (room, wall) of one, (room, wall) of the other)."""
     for k, m in itertools.combinations(range(len(rooms)), 2):
         for a, b in itertools.product(range(len(rooms[k])), range(len(rooms[m]))):
             yield RoomEdge(rooms[k][a], rooms[m][b], (k, m)), (k, a), (m, b)
 
 
 def _places_on(edge: RoomEdge, places: list[Vec], slack: float) -> list[Vec]:
-    """The places of an edge next to some places."""
+    """Return the places of an edge next to given places."""
     walls = edge.one, edge.other
     with np.errstate(all="ignore"):
         found = [crossing(*walls, place, math.inf) for place in places]
@@ -235,15 +235,15 @@ def _places_on(edge: RoomEdge, places: list[Vec], slack: float) -> list[Vec]:
 
 
 def _starts_along(edge: RoomEdge, on_it: list[Vec], extent: float) -> list[Vec]:
-    """Places on an edge, and far from these both ways along it."""
+    """Return places on an edge, and far from these both ways along it."""
     return [x + way * along for x in on_it for along in [_along(edge, x)] for way in (0.0, extent, -extent)]
 
 
 def _are_one(edge: RoomEdge, rooms: tuple[Any, ...], places: list[Vec], slack: float) -> bool:
-    """Whether walls of two rooms are in one place, or go on smoothly from one to the other.
+    """Whether walls of two rooms coincide, or one continues the other smoothly.
 
-    Then a ball that both touch is at one place of them, and has one contact. Walls in one place are that at any; those
-    that go on smoothly, as a tube and its round end, do so where a third wall of either room ends one of them.
+    Then a ball that touches both is at one place of them, with one contact. Walls that coincide do so everywhere; walls
+    with a smooth transition, as a tube and its round end, have it where a third wall of either room ends one of them.
     """
     one, other = edge.one, edge.other
     with np.errstate(all="ignore"):
@@ -265,7 +265,7 @@ def _foot_on(wall: Any, x: Vec) -> Vec:
 
 
 def _go_on(one: Any, other: Any, x: Vec, slack: float) -> bool:
-    """Whether a place is on two walls with one normal there."""
+    """Whether a place is on two walls with the same normal there."""
     return _is_on((one, other), x, slack) and bool(dot(outward(one, x), outward(other, x)) > 1.0 - _SMOOTH)
 
 
@@ -277,7 +277,7 @@ def _corners_of(
     bounds: list[Any],
     extent: float,
 ) -> Iterator[tuple[int, RoomCorner]]:
-    """Where faces of one room join that are of one wall: each (the number of a face, the corner)."""
+    """Yield the corners where faces of one room and of one wall join: each (the number of a face, the corner)."""
     slack = _SLACK * extent
     for i, j in itertools.combinations(range(len(faces)), 2):
         (k, _k), wall, mate = faces[i].rooms, faces[i].wall, faces[j].wall
@@ -308,11 +308,11 @@ def _is_on(walls: tuple[Any, ...], x: Vec, slack: float) -> bool:
 def _tips_of(
     edge: RoomEdge, starts: list[Vec], rooms: tuple[Any, ...], bounds: list[Any], slack: float
 ) -> list[tuple[Vec, float]]:
-    """The tips of an edge, where it is seen and goes into a third room: each a (place, uncertainty of the place [m]).
+    """Return the tips of an edge, where it is seen and enters a third room: (place, uncertainty of the place [m]) each.
 
     Args:
         edge: an edge.
-        starts: the places that tips are searched from.
+        starts: the places from which tips are searched.
         rooms: the walls of each room.
         bounds: a box around each room.
         slack: round-off of a place [m].
@@ -334,8 +334,8 @@ def _tips_of(
 def _turns(edge: RoomEdge, starts: list[Vec], rooms: tuple[Any, ...], slack: float) -> bool:
     """Whether an edge is seen where it ends at another wall of its own rooms.
 
-    What is seen of an edge is all of a closed curve, or it ends at a tip or there: it may be shorter than the way
-    between any two places that it is searched from.
+    The seen part of an edge is a closed curve, or it ends at a tip or at such a wall: it may be shorter than the way
+    between any two places from which it is searched.
     """
     ends = (x for k in edge.rooms for _walls, x in _ends_at(edge, rooms[k], starts, slack))
     return any(_is_seen_at(edge, rooms, x, slack) for x in ends)
@@ -344,7 +344,7 @@ def _turns(edge: RoomEdge, starts: list[Vec], rooms: tuple[Any, ...], slack: flo
 def _is_seen_at(edge: RoomEdge, rooms: tuple[Any, ...], x: Vec, slack: float) -> bool:
     """Whether an edge is seen at a place, or at its end, and beside it within all other walls of its own rooms.
 
-    Corners that two rooms have in common are no edge: balls turn about what only two walls end at.
+    Corners that two rooms have in common are no edge: balls turn about edges at which only two walls end.
     """
     if not is_seen(rooms, edge.rooms, x, slack):
         return False
@@ -357,7 +357,7 @@ def _is_seen_at(edge: RoomEdge, rooms: tuple[Any, ...], x: Vec, slack: float) ->
 
 
 def _ends_at(edge: RoomEdge, room: Any, starts: list[Vec], slack: float) -> Iterator[tuple[tuple[Any, ...], Vec]]:
-    """Where an edge meets other walls of a room: (the three walls, the place), each once."""
+    """Yield where an edge meets other walls of a room: (the three walls, the place), each once."""
     for wall in room:
         walls, known = (edge.one, edge.other, wall), list[Vec]()
         if wall is not edge.one and wall is not edge.other:
@@ -369,7 +369,7 @@ def _ends_at(edge: RoomEdge, room: Any, starts: list[Vec], slack: float) -> Iter
 
 
 def _bend_on(edge: RoomEdge, on_it: list[Vec]) -> float:
-    """A lower bound of the radius of curvature of an edge [m], by descent along the edge."""
+    """Return a lower bound of the radius of curvature of an edge [m], by descent along the edge."""
     bends = [edge.bend_at(x) for x in on_it]
     order = np.argsort(bends)
     least = bends[order[0]]
@@ -390,19 +390,19 @@ def _bend_on(edge: RoomEdge, on_it: list[Vec]) -> float:
 
 
 def _volume(walls: tuple[Any, ...], x: Vec) -> float:
-    """The volume that the unit normals of three walls span at a place: 0 where an edge only touches the third wall."""
+    """Return the volume that unit normals of three walls span at a place: 0 if an edge only touches the third wall."""
     one, other, third = (outward(wall, x) for wall in walls)
     return abs(float(dot(one, cross(other, third))))
 
 
 def _along(edge: RoomEdge, x: Vec) -> Vec:
-    """The unit vector along an edge."""
+    """Return the unit vector along an edge."""
     along = cross(outward(edge.one, x), outward(edge.other, x))
     return Vec(*(float(part) / norm(along) for part in along))
 
 
 def _meeting(walls: tuple[Any, ...], x: Vec) -> Vec:
-    """The place where three walls meet, by Newton's method; where it does not converge, a place off the walls."""
+    """Return the place where three walls meet, by Newton's method; if it does not converge, a place off the walls."""
     for _sweep in range(_SWEEPS):
         normals = [outward(wall, x) for wall in walls]
         step = ZERO

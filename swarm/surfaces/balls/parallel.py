@@ -1,4 +1,4 @@
-"""Surfaces that balls meet by the foot of the normal: their parallel surfaces, and how large balls may be."""
+"""Surfaces that balls meet by the foot of the normal: their parallel surfaces, and the largest radius of balls."""
 
 import math
 from typing import Any
@@ -13,17 +13,17 @@ from .. import rotation as rotations
 from ..surface import UNBOUNDED, Box, Surface, shown
 from .by_foot import ByFoot
 
-# Points that are moved to where the surface is steepest least, their first step and the last one, in parts of its size.
+# The points that search the least slope: their number, the first and last step, its reduction, Newton's steps of each.
 _STARTS, _FIRST, _SHORTEST, _SHORTER, _MOVES = 16, 0.05, 1e-6, 0.7, 3
-# A point this close to a surface, in parts of its size, is on it; it is moved there so often at most.
+# A point this close to a surface, as a part of its size, is on it; the most moves onto it.
 _NEAR, _ONTO = 1e-6, 30
 
 
 class Parallel(Surface):
-    """A surface with a smooth phi; its second derivatives have a bound."""
+    """A surface with a smooth phi that has bounded second derivatives."""
 
     def tightest(self) -> tuple[float, Vector | None]:
-        """The smallest radius of curvature that is certain [m], and where on the surface, None where it is infinite."""
+        """Return the smallest certain radius of curvature [m], and its place on the surface, None if it is infinite."""
         radius, where = self.own_tightest()
         if where is None:
             return radius, None
@@ -32,20 +32,20 @@ class Parallel(Surface):
         return radius, (x, y, z)
 
     def own_tightest(self) -> tuple[float, Any]:
-        """The same, with the place from the middle on, before the surface is rotated about that."""
+        """Return `tightest` with the place relative to the middle, before the surface is rotated about the middle."""
         raise NotImplementedError
 
     def middle(self) -> Vector:
-        """The place about which the surface is rotated."""
+        """Return the place about which the surface is rotated."""
         return self.center  # type: ignore[attr-defined, no-any-return]
 
     def by_foot(self, largest: float) -> ByFoot:
-        """What balls up to a radius meet, in the frame of `numbers`."""
+        """Return the wall for balls up to a radius, in the frame of `numbers`."""
         numbers = self.numbers()
         return foot_of(numbers, numbers.hessian_bounds(None)[0], self.tightest()[0])
 
     def framed_alike(self, wall: Any) -> Any:
-        """A wall in the frame of `numbers` as the scene has it."""
+        """Return a wall in the frame of `numbers`, transformed to the scene."""
         return rotations.rotated(self.rotation, wall)
 
     def walls_of_balls(self, largest: float) -> tuple[Any, ...]:
@@ -68,7 +68,7 @@ class Parallel(Surface):
 
 
 def reach_by_distance(surface: Any, points: Floats, radius: Floats, time: float) -> Floats:
-    """How far balls (N,) at points (3, N) reach out of a surface [m]; its one wall of balls gives distances."""
+    """Return how far balls (N,) at points (3, N) reach out of a surface [m]; its one wall for balls gives distances."""
     found = np.empty(points.shape[1])
     distances_from(surface.walls_of_balls(0.0)[0], np.ascontiguousarray(surface._own_rows(points, time)), found)
     return found + radius
@@ -76,26 +76,26 @@ def reach_by_distance(surface: Any, points: Floats, radius: Floats, time: float)
 
 @kernel
 def distances_from(wall, points, found):
-    """How far points (3, N) are outside of a wall, into `found`."""
+    """Write the distances of points (3, N) outside a wall into `found`."""
     for i in range(points.shape[1]):
         found[i] = wall.distance(column(points, 0, i))
 
 
 def foot_of(numbers: Any, most: float, bend: float, box: Box = UNBOUNDED, known: float = math.inf) -> ByFoot:
-    """The wall of balls of these numbers: side H is at most so much up to twice `known` from it; it is in a box."""
+    """Return the wall for balls of a record: side H is at most `most` up to twice `known` from it; it is in a box."""
     low, high = (Vec(*map(float, corner)) for corner in box)
     return ByFoot(numbers, 0.0, float(most), float(bend), low, high, float(known))
 
 
 def nearer(points: Floats, value: Any, slope: Any) -> Floats:
-    """Newton's step of points (3, N) onto a surface along the gradient."""
+    """Return points (3, N) after Newton's step onto a surface along the gradient."""
     normal = slope(points)
     with np.errstate(all="ignore"):
         return np.asarray(points - value(points) / (normal**2).sum(axis=0) * normal)
 
 
 def onto(points: Floats, value: Any, slope: Any) -> Floats:
-    """Points (3, N) moved onto a surface along the gradient; those that come to it near where they were."""
+    """Return points (3, N) moved onto a surface along the gradient, without those that move far."""
     size, to = np.ptp(points, axis=1).max(), points
     for _move in range(_ONTO):
         to = nearer(to, value, slope)
@@ -105,7 +105,7 @@ def onto(points: Floats, value: Any, slope: Any) -> Floats:
 
 
 def tightest_of(points: Floats, value: Any, slope: Any, most: float) -> tuple[float, Vector]:
-    """The least |grad phi|/(2 most) of a surface, and where, from points (3, N) on it: by shorter and shorter steps."""
+    """Return the least |grad phi|/(2 most) on a surface, and its place, by descent from points (3, N) on it."""
     steep = np.sqrt((slope(points) ** 2).sum(axis=0))
     near = _NEAR * float(steep.max()) * float(np.ptp(points, axis=1).max())
     best = points[:, np.argsort(steep)[:_STARTS]]

@@ -1,8 +1,8 @@
-"""Convex solids that balls meet: all that is within the radius of a ball from the body, with its edges round.
+"""Convex solids that balls meet: the places within the radius of a ball from the body, with round edges.
 
-phi, the inner function, is the distance from that. The body is behind the plane across the normal at its nearest point:
-safe steps of a flight are those to planes, which are Newton's. Deep in the body, where soft balls may be, the distance
-is that to the nearest of its faces.
+phi, the inner function, is the distance from these. The body is behind the plane across the normal at its nearest
+point: safe steps of a flight are steps to planes, which are Newton's. Deep in the body, where soft balls may be, the
+distance is that to the nearest face.
 """
 
 import math
@@ -25,14 +25,14 @@ _CLOSE = 1e-8
 
 
 class Rounded(AtRadius):
-    """A solid grown by the field `radius`; it gives `foot`."""
+    """A solid grown by the field `radius`; subclasses define `foot`."""
 
     side = -1.0
 
     def foot(self, r):
-        """The signed distance of a point outside of the body, and the unit normal of that where it is nearest.
+        """Return the signed distance of a point outside the body, and the unit normal of the body at its nearest point.
 
-        In Python also of arrays of points.
+        In Python also for arrays of points.
         """
         raise NotImplementedError
 
@@ -43,7 +43,7 @@ class Rounded(AtRadius):
         return self.foot(r)[1]
 
     def before(self, gravity, r, v):
-        """When a flight comes to the plane that is as far as the radius from the one at the foot."""
+        """Return when a flight comes to the plane at the distance `radius` from the one at the foot."""
         away, n = self.foot(r)
         half = -0.5 * dot(n, v)
         bend = 0.0 * half if gravity is None else -0.5 * dot(n, as_vector(gravity))
@@ -69,43 +69,43 @@ class Rounded(AtRadius):
         return self.foot(0.5 * (low + high))[0] <= self.radius + 0.500001 * norm(high - low)
 
     def farthest_push(self):
-        # Where it is as round as the ball at the most, as of a sphere
+        # Where its curvature is at most that of the ball, as on a sphere
         return -2.0 * self.radius
 
     def hessian(self, r):
         return half_hessian(self, r, SPACING * (abs(self.phi(r)) + self.radius) + TINY)
 
     def hessian_bounds(self, r):
-        # 0 <= H <= 1/(2 d), where d is the distance from the body
+        # 0 <= H <= 1/(2 d), with the distance d from the body
         away = max(self.foot(r)[0], self.radius)
         return 0.0, 1.0 / select(away > 0.0, away, 1.0), 0.5 * away
 
 
 def part_within(d, way):
-    """The part of a way at which it is nearest to a place, from 0 to 1."""
+    """Return the part of a way, from 0 to 1, at which it is nearest to a place."""
     length2 = square(way)
     part = dot(d, way) / select(length2 > 0.0, length2, 1.0)
     return select(part > 0.0, select(part < 1.0, part, 1.0), 0.0)
 
 
 def foot_at(e, depth, face):
-    """The foot of a point, by the vector from the nearest point of the body, and, in it, the nearest face.
+    """Return the foot of a point, by the vector from the nearest point of the body, and inside it the nearest face.
 
     Args:
-        e: that vector, 0 in the body.
+        e: the vector, 0 in the body.
         depth: the signed distance from the nearest face.
-        face: its normal.
+        face: the normal of this face.
     """
     away = np.sqrt(square(e))
-    # No select here and below: these may be arrays.
+    # No select here and below: the arguments may be arrays.
     inside = 1.0 * (away == 0.0)
     return away + np.minimum(depth, 0.0), e * (1.0 / np.maximum(away, TINY)) + inside * face
 
 
 class ToBody(Approach):
-    """The steps of a flight to a grown body, each to a plane in front of it."""
+    """The steps of a flight to a grown body, each to a plane in front of the body."""
 
-    # What is not found by then goes on in the next pass.
+    # The search continues in the next pass after this number of steps.
     most = 60
 
     def first_step(self):
@@ -127,7 +127,7 @@ class RoundBox(Rounded):
     radius: float
 
     def by_right_angles(self, axes):
-        """The same where its own axes are these other axes of the scene, or their opposites."""
+        """Return the box with its axes along these axes of the scene, or their opposites."""
         center, half = axes @ np.array(self.center), abs(axes) @ np.array(self.half)
         return self._replace(center=Vec(*center.tolist()), half=Vec(*half.tolist()))
 
@@ -170,7 +170,7 @@ class RoundCone(Rounded):
         d = r - self.center
         across = np.sqrt(d.x * d.x + d.y * d.y)
         part = 1.0 / np.maximum(across, TINY)
-        # How far from the wall, and how far along it from the tip the nearest point is
+        # The distance from the wall, and the distance along it from the tip to the nearest point
         off, along = across * self.cosine - d.z * self.sine, across * self.sine + d.z * self.cosine
         foot = np.maximum(along, 0.0)
         out = 1.0 * ((off > 0.0) | (along < 0.0))
@@ -180,5 +180,5 @@ class RoundCone(Rounded):
 
 
 def _beyond(out, x):
-    """How far a coordinate is beyond the end that it is out of by so much, with its sign; 0 between both ends."""
+    """Return by how much a coordinate is beyond the nearer end, with its sign, given `out`; 0 between both ends."""
     return np.copysign(np.maximum(out, 0.0), x)

@@ -1,4 +1,4 @@
-"""The tip of a cone that balls are in: the parallel surface is a cone too; its tip is farther along the axis."""
+"""The tip of a cone with balls inside: the parallel surface is a cone too; its tip is farther along the axis."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from ..shapes.quadratic import QuadricNumbers
 
 
 class OfTip(Unturned):
-    """A surface at the tip of a cone that balls are in."""
+    """A surface at the tip of a cone with balls inside."""
 
     if TYPE_CHECKING:
         body: Any
@@ -25,7 +25,7 @@ class TipPlane(OfTip):
     """The plane through the tip, across the axis."""
 
     body: PlaneNumbers
-    lift: float  # by which part of its radius the tip is farther along the axis for a ball
+    lift: float  # for a ball the tip is farther along the axis by this part of the radius
 
     def grown(self, radius):
         return self._replace(body=self.body._replace(offset=self.body.offset - radius * self.lift))
@@ -40,14 +40,14 @@ class Nappes(OfTip):
     cosine: float
 
     def by_right_angles(self, axes):
-        """The same where its own axes are these other axes of the scene, or their opposites."""
+        """Return the nappes with their axes along these axes of the scene, or their opposites."""
         return self._replace(body=self.body.by_right_angles(axes), axis=Vec(*(axes @ np.array(self.axis)).tolist()))
 
     def grown(self, radius):
         return self._replace(body=self.body._replace(center=self.body.center + (radius / self.sine) * self.axis))
 
     def phi(self, r):
-        # Of points below the tip too: there the plane is the wall.
+        # Also for points below the tip: the plane is the wall there.
         d = r - self.body.center
         along = dot(d, self.axis)
         across2 = square(d - along * self.axis)

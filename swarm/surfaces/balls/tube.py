@@ -15,18 +15,18 @@ class Tube(Distance, ExactChord):
     """A cylinder along an axis of its frame, or a cylinder that balls meet: a sphere of two dimensions."""
 
     center: Vec
-    across: Vec  # 1 along the two axes across its own, 0 along that
+    across: Vec  # 1 along the two axes across its own, 0 along its own
     radius: float
     radius2: float
     side: float
 
     def by_right_angles(self, axes):
-        """The same where its own axes are these other axes of the scene, or their opposites."""
+        """Return the tube with its axes along these axes of the scene, or their opposites."""
         center, across = axes @ np.array(self.center), abs(axes) @ np.array(self.across)
         return self._replace(center=Vec(*center.tolist()), across=Vec(*across.tolist()))
 
     def off(self, r):
-        """The vector from the axis."""
+        """Return the vector from the axis."""
         return times(self.across, r - self.center)
 
     def inner(self, r):
@@ -66,14 +66,14 @@ class Tube(Distance, ExactChord):
         a2 = a + dot(d, g)
         size = self.radius2 + select(c > 0.0, c, 0.0)
         level, window = level_and_window(c, self.radius2, size, a, gg)
-        # Where nothing pulls across the axis the level is a parabola.
+        # Without a pull across the axis the level is a parabola.
         falls = gg > 0.0
         level, window = select(falls, level, c), select(falls, window, math.inf)
         a3, a4 = select(falls, side * dot(u, g), 0.0), select(falls, side * 0.25 * gg, 0.0)
         return Quartic(side * level, side * b, side * a2, a3, a4, window)
 
     def reach(self, lease):
-        # What the wall does counts whatever its direction is; along the axis nothing comes nearer.
+        # The motion of the wall counts in any direction; along the axis nothing comes nearer.
         d, u, a = self.off(lease.r), times(self.across, lease.v), times(self.across, lease.a)
         clear = max(-self.side * (math.sqrt(square(d)) - self.radius), 0.0)
         return rise_time(-clear, 0.5 * (norm(u) + lease.width), 0.5 * norm(a))
@@ -88,7 +88,7 @@ class Tube(Distance, ExactChord):
         return r0 + (p - (kappa / (1.0 + kappa)) * d)
 
     def rise(self, r0, p, kappa):
-        # As of a sphere
+        # As for a sphere
         d, u = self.off(r0), times(self.across, p)
         q0, dp = square(d), 2.0 * dot(d, u)
         free, fall = dp + square(u), 4.0 * q0 + dp
@@ -109,7 +109,7 @@ class Tube(Distance, ExactChord):
         n = 2.0 * self.off(r) + times(self.across, p)
         return n * (self.side / norm(n))
 
-    # --- Of walls that move other than uniformly ---
+    # --- For walls that move other than uniformly ---
 
     def hessian_bounds(self, r):
         # H = 1 across the axis
@@ -122,5 +122,5 @@ class Tube(Distance, ExactChord):
 
 
 def tube_of(center, radius, side):
-    """The numbers of a cylinder about the z axis of its frame."""
+    """Return the record of a cylinder about the z axis of its frame."""
     return Tube(center, Vec(1.0, 1.0, 0.0), radius, radius * radius, side)

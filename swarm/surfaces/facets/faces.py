@@ -1,7 +1,7 @@
-"""The faces of a mesh that soft balls touch at one place each: triangles in one plane, and those of a convex body.
+"""The faces of a mesh that soft balls touch at one place each: coplanar triangles, and triangles of a convex body.
 
-Where two triangles make a corner around the balls they are of two faces, and a ball in it touches both. The nearest
-place of what is convex goes on without a jump of the normal. Triangles in one plane, to the round-off of a file, are
+Where two triangles make a corner around the balls they are of two faces, and a ball in it touches both. At the nearest
+place of a convex body the normal has no jump. Triangles in one plane, to the round-off of a file, are
 put into that plane: from one to the next neither the distance nor the normal changes.
 """
 
@@ -12,9 +12,9 @@ import numpy as np
 from ...state import Floats, Indices
 from .mending import parts_of
 
-# The sine of an angle between triangles that are in one plane, and how far from that corners may be, of the size.
+# The sine of an angle between coplanar triangles, and the distance of corners from their plane, as a part of the size.
 _FLAT, _OFF = 1e-5, 1e-6
-# A face has at most so many planes: more take long to compare. A part is convex if its hull is larger by no more than
+# The most planes of a face: more take long to compare. A part is convex if the area of its hull is larger by at most
 # this part of it.
 _MOST, _WIDER = 2000, 1e-5
 
@@ -33,12 +33,12 @@ class _Groups:
 
 
 def faces_of(vertices: Floats, triangles: Indices, side: float) -> tuple[Floats, Indices]:
-    """The corners (T, 3, 3) of the triangles, those of one plane in it, and the number of the face of each (T,).
+    """Return the corners (T, 3, 3) of triangles, moved into common planes, and the number of the face of each (T,).
 
     Args:
         vertices: (V, 3) [m].
         triangles: (T, 3), which turn to the left seen from outside.
-        side: 1 where balls are outside, -1 inside, 0 on both sides of sheets, where no corner is one of a convex body.
+        side: 1 if balls are outside, -1 inside, 0 on both sides of sheets, which have no corner of a convex body.
     """
     corners, of_sheets = vertices[triangles], side == 0.0
     crossed = (side or 1.0) * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -50,7 +50,7 @@ def faces_of(vertices: Floats, triangles: Indices, side: float) -> tuple[Floats,
         groups.parent[groups.root(one)] = groups.root(other)
     planes = np.array([groups.root(i) for i in range(len(triangles))])
     if of_sheets:
-        # Those of one plane may be turned either way.
+        # Triangles in one plane may be turned either way.
         crossed = np.where((normals * normals[planes]).sum(axis=1)[:, None] < 0.0, -crossed, crossed)
     corners = _in_planes(corners, crossed, planes)
     groups = _Groups(len(triangles))
@@ -63,7 +63,7 @@ def faces_of(vertices: Floats, triangles: Indices, side: float) -> tuple[Floats,
 
 
 def _join_flat(groups: _Groups, planes: Indices, corners: Floats, normals: Floats, edges: Indices) -> None:
-    """Join triangles of one plane where they are convex: all of them, or one after the other along these edges."""
+    """Join coplanar triangles if they are convex: all of them, or one after the other along these edges."""
     areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
 
     def is_convex(some: list[int]) -> bool:
@@ -85,7 +85,7 @@ def _join_flat(groups: _Groups, planes: Indices, corners: Floats, normals: Float
 
 
 def _hull(points: Floats, normal: Floats) -> float:
-    """The area of the convex hull of points of a plane."""
+    """Return the area of the convex hull of points in a plane."""
     from scipy.spatial import ConvexHull
 
     first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
@@ -95,7 +95,7 @@ def _hull(points: Floats, normal: Floats) -> float:
 
 
 def _joints(corners: Floats, triangles: Indices, normals: Floats) -> tuple[Indices, Floats]:
-    """The pairs of triangles that share an edge, and by which sine the other rises towards the balls there."""
+    """Return the pairs of triangles that share an edge, and the sine by which the second rises towards the balls."""
     count = len(triangles)
     ends = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     order = np.lexsort((ends[:, 1], ends[:, 0]))
@@ -114,13 +114,13 @@ def _joints(corners: Floats, triangles: Indices, normals: Floats) -> tuple[Indic
 
 
 def _join_edges(groups: _Groups, planes: Indices, corners: Floats, normals: Floats, edges: Indices) -> None:
-    """Join what meets at edges towards the balls, in this order, where all of it is behind all of its planes.
+    """Join the faces at edges towards the balls, in this order, if all of both is behind all planes of both.
 
-    Two parts of one plane, which has a hole or a notch, stay apart.
+    Two parts of one plane with a hole or a notch stay apart.
     """
     near = _OFF * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
     roots = np.array([groups.root(i) for i in range(len(planes))])
-    # Of each its planes as rows (normal, offset), of a flat one the first triangle's; its corners; and their numbers.
+    # For each body planes as rows (normal, offset), for a flat one that of the first triangle; corners; and numbers.
     bodies: dict[int, tuple[Floats, Floats, set[int]]] = {}
     for part in parts_of(roots):
         n = normals[part[:1]]
@@ -142,7 +142,7 @@ def _is_behind(points: Floats, planes: Floats, near: float) -> bool:
 
 
 def _in_planes(corners: Floats, crossed: Floats, planes: Indices) -> Floats:
-    """The corners of triangles, each in the plane of those with its number if that is near."""
+    """Return the corners of triangles, each in the common plane of the triangles with its number if that is near."""
     which, each = np.unique(planes, return_inverse=True)
     sums = np.zeros((len(which), 3))
     np.add.at(sums, each, crossed)

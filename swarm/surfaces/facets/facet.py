@@ -14,16 +14,16 @@ from ..time_of_impact.rising import patch_step
 
 # The round-off of places, as a part of the farthest coordinate: far above that of numbers, and of a hit.
 ROOM = 2.0**-40
-# Half of the thickness of a sheet, and how far its sides go on beyond its edges, in units of the round-off of places:
-# far above what a flight ends beside its wall by, and so far that the sides of a fold of 2 degrees meet. A step of a
-# slide ends behind a side by less than the third, so that it is never on the other side.
+# Half of the thickness of a sheet, and how far its sides extend beyond its edges, in units of the round-off of places:
+# far above the distance at which a flight ends beside its wall, and so far that the sides of a fold of 2 degrees meet.
+# The last one: a sliding step ends behind a side by less than this, and so never on the other side.
 THIN, OVERLAP, _BEHIND_SIDE = 32.0, 2048.0, 8.0
-# A step that has come through a facet ends behind it by no more than this many times the round-off of places.
+# A step that has come through a facet ends behind it by at most this multiple of the round-off of places.
 _BEHIND = 1e4
 
 
 class Shared(Record):
-    """A number that all walls of a field have in common."""
+    """A number common to all walls of a field."""
 
     value: float
 
@@ -34,16 +34,16 @@ class Corners(Record):
     a: Vec
     b: Vec
     c: Vec
-    turn: float  # 1, or -1 where they go round the normal the other way
-    beyond: float  # how far beyond its edges it goes on [m]
+    turn: float  # 1, or -1 if they go round the normal the other way
+    beyond: float  # by how much the facet extends beyond its edges [m]
 
     def edges(self):
-        """Where each edge begins, and the way along it."""
+        """Return the start of each edge, and the vector along it."""
         return (self.a, self.b - self.a), (self.b, self.c - self.b), (self.c, self.a - self.c)
 
 
 class CornersOf(Record):
-    """The corners of all facets, which share them: 12 bytes of a facet where its edges would take 96."""
+    """The corners of all facets, which share vertices: 12 bytes of a facet where its edges would take 96."""
 
     vertices: Array  # (V, 3)
     triangles: Array  # (T, 3) int32
@@ -51,22 +51,22 @@ class CornersOf(Record):
     beyond: float
 
     def of(self, m):
-        """Those of one facet."""
+        """Return the corners of one facet."""
         a, b, c = (self.vertex(m, k) for k in range(3))
         return Corners(a, b, c, self.turn, self.beyond)
 
     def row(self, m):
-        """The row of its triangle."""
+        """Return the row of its triangle."""
         return m
 
     def vertex(self, m, k):
-        """One of them."""
+        """Return one corner."""
         at = index(self.triangles[self.row(m), k])
         return Vec(self.vertices[at, 0], self.vertices[at, 1], self.vertices[at, 2])
 
 
 class CornersOfSides(CornersOf):
-    """Those of sheets: two facets in a row are the sides of one triangle."""
+    """The corners of sheets: two consecutive facets are the sides of one triangle."""
 
     def of(self, m):
         a, b, c = (self.vertex(m, k) for k in range(3))
@@ -77,29 +77,29 @@ class CornersOfSides(CornersOf):
 
 
 class WayPast(Record):
-    """Whether a flight surely does not meet a facet, and until when it surely is before its plane."""
+    """Whether a flight surely misses a facet, and the time until which it surely is before the plane of the facet."""
 
     misses: bool
     begin: float
 
 
 class FacetNumbers(Flat):
-    """A facet as kernels take it.
+    """The record of a facet for kernels.
 
     A place is between the edges up to the round-off of places, `room`, so that neighbours overlap and no flight passes
-    between them. What is beyond the edges is nowhere hit before what is there: at a convex edge the neighbour is met
-    sooner, and at a re-entrant one the facet is so much larger.
+    between them. A place beyond the edges is never hit before the wall there: at a convex edge the neighbour is met
+    sooner, and at a re-entrant one the facet is larger by this overlap.
     """
 
     normal: Vec
     offset: float
-    corners: Any  # `Corners`, or None where it is known to be met
+    corners: Any  # `Corners`, or None if the facet is known to be met
     room: Shared
 
     # --- Its part of the plane ---
 
     def within(self, r):
-        """How far a place is from the nearest edge inwards, with the room; below 0 where it is beyond one."""
+        """Return the distance of a place from the nearest edge inwards, plus the overlap; below 0 beyond an edge."""
         least = math.inf
         for start, inwards in reversed(self.edges()):
             here = dot(inwards, r - start)
@@ -107,7 +107,7 @@ class FacetNumbers(Flat):
         return least + self.room.value + self.corners.beyond
 
     def edges(self):
-        """A point of each edge, and the unit vector in the plane from there into the triangle."""
+        """Return a point of each edge, and the unit vector in the plane from there into the triangle."""
         normal = self.corners.turn * self.normal
         return tuple((start, (1.0 / norm(way)) * cross(normal, way)) for start, way in self.corners.edges())
 
@@ -120,32 +120,32 @@ class FacetNumbers(Flat):
         return found
 
     def is_there(self, r, near):
-        """Whether the facet reaches as near as this to a point on its plane: to one deep behind it, it does not."""
+        """Whether the facet is within `near` of a point on its plane; it is not for a point deep behind it."""
         return (self.within(r) >= -near) & (self.phi(r) <= self.behind())
 
     def distance(self, r):
-        # Beyond its edges, or deep behind it, where other walls are, not nearer than that
+        # Beyond its edges, or deep behind it, where other walls are, the distance is to the facet itself
         depth, within = self.inner(r) - self.offset, self.within(r)
         beyond = select(within < 0.0, within, 0.0)
         there = (beyond == 0.0) & (depth <= self.behind())
-        # In the round-off beyond an edge, as before a neighbour that it meets there, a place is no deeper than that
+        # Within round-off beyond an edge, where it meets a neighbour, a place is no deeper than `within`
         depth_there = select((within < self.room.value) & (within < depth), within, depth)
         return select(there, depth_there, self.elsewhere(beyond, depth))
 
     def is_ahead(self, start, end, near):
-        """Whether what goes from one place to another may come through it: it is nearer to the end than `near`."""
+        """Whether a move between two places may come through the facet: its end is at most `near` before it."""
         return self.distance(end) >= -near
 
     def elsewhere(self, beyond, depth):
-        """Its distance from where it is not: beyond its edges, or deep behind it."""
+        """Return its distance from a place beyond its edges, or deep behind it."""
         return -math.sqrt(beyond * beyond + depth * depth)
 
     def behind(self):
-        """How deep behind it a place is one that has come through it by a step, and none of another room."""
+        """Return the largest depth behind the facet after a step through it; deeper places belong to another room."""
         return _BEHIND * self.room.value
 
     def may_reach(self, low, high):
-        # A box is beyond an edge, or on one side of the plane, where all of it is.
+        # The box is off the facet if all of it is beyond an edge, or on one side of the plane.
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         reach = dot(absolute(self.normal), half) + self.room.value
         found = abs(dot(self.normal, middle) - self.offset) <= reach
@@ -166,13 +166,13 @@ class FacetNumbers(Flat):
         depth = self.inner(r) - self.offset
         b, a = 0.5 * dot(self.normal, v), 0.5 * dot(self.normal, pull)
         time = rise_time(depth, b, a)
-        # From behind the plane, beyond an edge, it falls through it, and back.
+        # From behind the plane, beyond an edge, it falls through the plane and back.
         comes_back = (b < 0.0) & (a > 0.0) & (b * b >= a * depth)
         return self._taken((depth <= self.room.value) | comes_back, time, pull, r, v), True
 
     def _taken(self, may_hit, time, pull, r, v):
-        """The time at which its plane is met from inside, if that is at the facet."""
-        # If the plane is never met, the place is that of the start: every place is then a finite number.
+        """Return the time at which its plane is met from inside, if the hit is at the facet, else infinity."""
+        # If the plane is never met, the start is the place: every place is then finite.
         t = select(time < math.inf, time, 0.0)
         place = r + displacement(pull, v, t)
         here = may_hit & (not self.is_beyond(place, 0.0))
@@ -192,10 +192,10 @@ class FacetNumbers(Flat):
         return patch_step(plane, is_behind, edges, seen, longest)
 
     def way_past(self, seen, longest):
-        """The `WayPast` of a flight for so long: one that misses is not behind it, or beyond an edge where it may be.
+        """Return the `WayPast` of a flight up to `longest`: one that misses stays before the plane or beyond an edge.
 
         The level of its plane is between c + 2 b t + (a - less) t^2 and c + 2 b t + (a + more) t^2: it rises between
-        the times at which both do, unless the lower one comes back.
+        the roots of both, unless the lower one comes back.
         """
         c, b, a = self.phi(seen.r), 0.5 * dot(self.normal, seen.v), 0.5 * dot(self.normal, seen.a)
         jerk, room, sixth = seen.jerk(longest), self.room.value, longest * (1.0 / 6.0)
@@ -213,7 +213,7 @@ class FacetNumbers(Flat):
 class SheetSide(FacetNumbers):
     """One side of a triangle that is a wall from both sides: a facet of a sheet; its other side is another facet.
 
-    The sides are so far apart that the place of a particle says on which one it is, also where it touches it.
+    The distance between the sides is so large that the place of a particle determines its side, also in contact.
     """
 
     def behind(self):
@@ -225,6 +225,6 @@ class SheetSide(FacetNumbers):
         return (self.phi(start) <= self.behind()) & (beyond * beyond + depth * depth <= near * near)
 
     def elsewhere(self, beyond, depth):
-        # What is behind it is on the other side of the sheet, and does not meet this one.
+        # A place behind this side is on the other side of the sheet, and does not meet this one.
         away = -math.sqrt(beyond * beyond + depth * depth)
         return select(depth > self.behind(), -math.inf, away)

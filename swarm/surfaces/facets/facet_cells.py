@@ -1,6 +1,6 @@
-"""The grid of facets: what is in each cell, and how far it is from each empty one to the next that is not.
+"""The grid of facets: the entries of each cell, and the distance from each empty cell to the next that is not empty.
 
-The facets of a mesh are on a surface, so most cells are empty: a flight leaps through blocks of these.
+The facets of a mesh are on a surface, so most cells are empty: a flight leaps through blocks of empty cells.
 """
 
 import math
@@ -22,63 +22,63 @@ from ...state import Floats
 from ..fields.grid import enter_bodies
 from .free_room import rows_of, spare_of
 
-# The square of the width of a cell is so many times the mean area of a facet: in wider cells a flight looks at more
+# The square of the width of a cell is this multiple of the mean area of a facet: in wider cells a flight tests more
 # facets, and it crosses more of narrower ones. It doubles with ten times as many facets, from the first number of
-# facets to the second: cells that the processor's cache holds are crossed sooner. Each facet has at most so many cells,
-# of 5 bytes each.
+# facets to the second: cells that the processor's cache holds are crossed sooner. The most cells for each facet, and
+# in all, of 5 bytes each.
 _AREA, _DOUBLES, _FEW, _MANY = 1.0, math.log10(2.0), 260.0, 1e5
 _CELLS_EACH, _MOST_CELLS = 32.0, 100_000_000
-# Cells of few facets.
+# The least number of cells.
 _LEAST_CELLS = 64
-# A plane in a cell is known by whole numbers up to this one, and so to these parts of the cell's diagonal and of a
-# speed; so many are made at once.
+# A plane in a cell is stored as whole numbers up to this one, and so to these parts of the cell's diagonal and of a
+# speed; and how many are computed at once.
 _FULL, _OFF, _OFF_SPEED, _TOGETHER = 32767.0, 1.5e-4, 6e-5, 1_000_000
-# A ball around a facet is known where its middle and its radius are within so many diagonals: its middle then by half
-# of one of these whole numbers along each axis, and the plane by 3 diagonals times the round-off of the normal more.
+# A ball around a facet is stored if its middle and its radius are within this number of diagonals: its middle to half
+# of one of these whole numbers along each axis, and the plane to 3 diagonals times the round-off of the normal more.
 _REACH = 2.0
-# The halves of balls are known by three digits to this base, above this zero, and by no more than this length.
+# The halves of balls are stored as three digits to this base, above this zero, with at most this length.
 _BASE, _ZERO, _LONGEST = 32.0, 16.0, 26.0
 # The first of these parts in the unit of the balls, and times the length of whole normals.
 _NEAR_PLACE = _OFF * _FULL / _REACH
 _NEAR = _NEAR_PLACE * _FULL
 # The largest s (s - 1/2) (s - 1) on the way from 0 to 1, sqrt(3)/36
 _CUBIC = 0.0482
-# How far beside the true place a flight may seem to come through a plane, by a distance and a speed that may be none.
+# How far beside the true place a flight may seem to cross a plane, for a distance and a speed that may be 0.
 _BESIDE = 4.0 / _OFF_SPEED
-# A flight to a mesh that turns or swings is known to be in a cell until shortly before its end: it ends so much
-# farther, in cells, that this is beyond the cell's wall.
+# A flight to a mesh that turns or swings is known to be in a cell until shortly before its end: it ends beyond the wall
+# of the cell by this part of a cell.
 MOVING_MARGIN = 0.02
-# So few facets are entered in plain Python.
+# Up to this number of facets are entered in plain Python.
 _SOME = 60
-# So many entries are looked at together, by the same instructions: what is known of them is side by side. A loop over
+# This number of entries is tested together, by the same instructions: their data are side by side. A loop over
 # four LLVM writes out, and makes no vectors of it.
 BLOCK = 8
 
 
-# A plane that hardly any flight comes through, as it faces away and is far ahead.
+# A plane that hardly any flight crosses, as it faces away and is far ahead.
 _NO_PLANE = np.array([-32767, 0, 0, 0, 32767, 0, 0, 0], np.int16)
 
 
 class FacetCells(Record):
-    """What is known of the cells of facets: `Grid.known`."""
+    """The data of the cells of facets: `Grid.known`."""
 
-    planes: Array  # (blocks, 8, BLOCK) int16, of each the normal, the half and the ball: `passes`
-    room: Array  # (cells + 1, 8) int8, of each what is free around it: see free_room.py
-    boxes: Any = None  # of a closed mesh, `boxes_of` its triangles
+    planes: Array  # (blocks, 8, BLOCK) int16: normal, half and ball of each entry, see `passes`
+    room: Array  # (cells + 1, 8) int8: the free cells around each cell, see free_room.py
+    boxes: Any = None  # for a closed mesh, `boxes_of` its triangles
 
     def spare(self, cell):
-        """How many of the last entries of a cell are there again, to fill its last block."""
+        """Return the number of last entries of a cell that are repeated to fill its last block."""
         return spare_of(self.room, cell)
 
 
 def cells_around(like, table: Floats, corners: Floats, beyond: float = 0.0, margin: float = MARGIN) -> Grid:
-    """The grid of the facets of a table, without what is free around its cells.
+    """Return the grid of the facets of a table, without the free blocks around its cells.
 
     Args:
-        like: one of them.
-        table: their numbers, one in each row.
-        corners: of each its three (T, 3, 3) [m].
-        beyond: how far each goes on beyond the box of these [m].
+        like: one of the facets.
+        table: the numbers of the facets, one facet in each row.
+        corners: the three corners of each facet (T, 3, 3) [m].
+        beyond: how far each facet extends beyond the box of its corners [m].
         margin: the part of a cell that a flight ends beyond its wall.
     """
     low, high = (
@@ -91,15 +91,15 @@ def cells_around(like, table: Floats, corners: Floats, beyond: float = 0.0, marg
 
 
 def _in_blocks(grid: Grid, table: Floats, corners: Floats) -> Grid:
-    """The grid with the entries of each cell in blocks of their own, without what is free around its cells.
+    """Return the grid with the entries of each cell in blocks of their own, without the free blocks around its cells.
 
-    The last one of a cell is there again and again where a block is not full.
+    The last entry of a cell is repeated to fill its last block.
     """
     counts = np.diff(grid.first)
     blocks = -(-counts // BLOCK)
     starts = np.concatenate([[0], np.cumsum(blocks)])
     cells = np.repeat(np.arange(len(counts)), blocks)
-    # The places of the entries of each block among those of its cell
+    # The places of the entries of each block among the entries of its cell
     places = BLOCK * (np.arange(len(cells)) - starts[cells])[:, None] + np.arange(BLOCK)
     last = counts[cells][:, None] - 1
     facets = grid.entries[grid.first[cells][:, None] + np.minimum(places, last)]
@@ -111,11 +111,11 @@ def _in_blocks(grid: Grid, table: Floats, corners: Floats) -> Grid:
 
 
 def _cells(corners: Floats, low: Floats, high: Floats, margin: float) -> tuple[Floats, Floats, Floats]:
-    """The corner of the first cell, how many there are along each axis, and how wide they are."""
+    """Return the corner of the first cell, the number of cells along each axis, and their widths."""
     a, b, c = np.moveaxis(corners, 1, 0)
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / len(corners)
     extent = high - low
-    # A flat mesh has room before and behind it.
+    # A flat mesh has cells before and behind it.
     extent = np.maximum(extent, 1e-3 * extent.max())
     most = min(max(_CELLS_EACH * len(corners), _LEAST_CELLS), _MOST_CELLS)
     wide = _AREA * (min(max(len(corners), _FEW), _MANY) / _FEW) ** _DOUBLES
@@ -130,7 +130,7 @@ def _cells(corners: Floats, low: Floats, high: Floats, margin: float) -> tuple[F
 def _planes(
     grid: Grid, table: Floats, corners: Floats, facets: NDArray[np.int32], cells: NDArray[np.int64]
 ) -> NDArray[np.int16]:
-    """The planes and the half balls of facets, each in the cell with this number."""
+    """Return the planes and the half balls of facets, each in the cell with this number."""
     width = np.array(grid.width)
     diagonal = float(np.linalg.norm(width))
     unit, none = _FULL / (_REACH * diagonal), _digits(np.zeros(3))
@@ -144,7 +144,7 @@ def _planes(
         made[some, :3] = np.rint(normal * _FULL)
         away, radius = middles[facets[some]] - middle, radii[facets[some]]
         near = (np.abs(away).max(axis=1) < _REACH * diagonal) & (radius < 0.9 * _REACH * diagonal)
-        # Of what is not, a place of the plane, and no half
+        # Otherwise a place of the plane, and no half
         foot = (offset - (normal * middle).sum(axis=1))[:, None] * normal
         made[some, 3] = np.where(near, _digits(halves[facets[some]]), none)
         made[some, 4:7] = np.rint(np.where(near[:, None], away, foot) * unit)
@@ -153,16 +153,16 @@ def _planes(
 
 
 def _half_balls(corners: Floats) -> tuple[Floats, Floats, Floats]:
-    """The least ball around each facet: its middle in the plane, its radius, and its half.
+    """Return the least ball around each facet: its middle in the plane, its radius, and its half.
 
-    The half is a vector h, of digits: the facet has no point r with h.(r - middle) less than -radius, which is beyond
+    The half is a vector h of digits: no point r of the facet has h.(r - middle) below -radius, which is beyond
     its longest edge. The half of a ball around a triangle with a right angle is twice as large as the triangle.
     """
     sides, every = np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1), np.arange(len(corners))
     squares = (sides**2).sum(axis=2)
     k = squares.argmax(axis=1)
     begin, way = corners[every, (k + 1) % 3], -sides[every, k]
-    # The circumcentre by its weights, or the middle of the longest edge where that is beyond it
+    # The circumcentre by its weights, or the middle of the longest edge if the circumcentre is beyond it
     weights = squares * (squares.sum(axis=1)[:, None] - 2.0 * squares)
     acute = weights.min(axis=1) > 0.0
     sums = np.where(acute, weights.sum(axis=1), 1.0)
@@ -182,12 +182,12 @@ def _half_balls(corners: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _digits(half: Floats) -> Floats:
-    """The three digits of a half as one number."""
+    """Return the three digits of a half as one number."""
     return np.asarray((half + _ZERO) @ np.array([_BASE * _BASE, _BASE, 1.0]))
 
 
 def _half(digits):
-    """The half of a number."""
+    """Return the half of a number."""
     x = np.floor(digits * (1.0 / (_BASE * _BASE)))
     rest = digits - _BASE * _BASE * x
     y = np.floor(rest * (1.0 / _BASE))
@@ -195,7 +195,7 @@ def _half(digits):
 
 
 def blocks_of(cells, number):
-    """The begin and the end of the blocks of entries of the cell with this number."""
+    """Return the begin and the end of the blocks of entries of the cell with this number."""
     cell, first = index(number), cells.first
     return index(first[cell]) // BLOCK, index(first[cell + index(1)]) // BLOCK
 
@@ -204,40 +204,40 @@ def blocks_of(cells, number):
 
 
 class FlightInCell(Record):
-    """A flight through a cell: lengths are in the unit of the balls, times in the time that it takes."""
+    """A flight through a cell: lengths are in the unit of the balls, times in units of its span."""
 
     at: Vec  # from the middle of the cell
     way: Vec  # by its velocity, and by its acceleration, or None
     bent: Any
-    slow: float  # a way by a velocity and by an acceleration that may be none, along whole normals
+    slow: float  # a way by a velocity and by an acceleration that may be 0, along whole normals
     weak: float
-    curve: Any  # the `CurveBound` of what it may come farther, or None
+    curve: Any  # the `CurveBound` of a changing acceleration, or None
 
 
 class CurveBound(Record):
-    """What bounds a flight that is no parabola, in the same units."""
+    """The bounds of a flight that is no parabola, in the same units."""
 
-    off: float  # how far it may be from the parabola
-    bends: float  # how much its velocity, and half of its acceleration, may differ
-    reach: float  # how far it may be from the middle between its ends
+    off: float  # its largest distance from the parabola
+    bends: float  # the largest change of its velocity, and of half of its acceleration
+    reach: float  # its largest distance from the middle between its ends
 
 
 def from_middle(cells, place, r):
-    """Where a place is from the middle of the cell at this place."""
+    """Return the vector from the middle of the cell at `place` to r."""
     w = cells.width
     return r - (cells.low + Vec((place.x + 0.5) * w.x, (place.y + 0.5) * w.y, (place.z + 0.5) * w.z))
 
 
 def flight_in(cells, at, v, pull, span, jerk=None):
-    """The `FlightInCell` of a flight that is in a cell for so long, from this place on from its middle.
+    """Return the `FlightInCell` of a flight that is in a cell for the time `span`.
 
     Args:
         cells: the grid.
-        at: the place [m].
+        at: its start, from the middle of the cell [m].
         v: the velocity there [m/s].
         pull: the acceleration there [m/s^2], or None.
-        span: how long [s].
-        jerk: its `Jerk` for so long, where the acceleration changes.
+        span: the time [s].
+        jerk: its `Jerk` during this time, if the acceleration changes.
     """
     unit = (_FULL / _REACH) / math.sqrt(square(cells.width))
     way, bent, weak, curve = (unit * span) * v, None, 0.0, None
@@ -247,7 +247,7 @@ def flight_in(cells, at, v, pull, span, jerk=None):
         sixth = unit * span * span * span * (1.0 / 6.0)
         off, bends = sixth * jerk.off, 3.0 * sixth * jerk.rest
         if jerk.known is not None:
-            # s^3 = (3 s^2 - s)/2 + s (s - 1/2) (s - 1), of which the last is little, and so are its derivatives.
+            # s^3 = (3 s^2 - s)/2 + s (s - 1/2) (s - 1), of which the last term is small, and so are its derivatives.
             cubic = sixth * jerk.known
             size, way, bent = norm(cubic), way - 0.5 * cubic, bent + 1.5 * cubic
             off, bends = off + _CUBIC * size, bends + 1.5 * size
@@ -259,10 +259,10 @@ def flight_in(cells, at, v, pull, span, jerk=None):
 
 
 def passes(cells, block, k, here):
-    """Whether a flight may come through the plane of an entry in its cell, there through the half ball of the facet.
+    """Whether a flight may cross the plane of an entry in its cell within the half ball of the facet.
 
-    Most do not, and no facet is looked up. What is known of the entry is round-off of whole numbers, and so long is its
-    normal. Without a branch: which entries a flight passes no processor foresees.
+    Most flights do not, and no facet is looked up. The plane is known to the round-off of whole numbers, and so is the
+    length of its normal. Without a branch: no processor predicts which entries a flight passes.
     """
     rows = cells.known.planes
     normal = _row(rows, block, 0, k)
@@ -272,7 +272,7 @@ def passes(cells, block, k, here):
     if here.bent is None:
         beyond = rate + here.slow
         meets = (beyond > 0.0) & (depth <= _NEAR) & (depth + beyond >= -_NEAR)
-        # All lengths times the speed along the normal, so that nothing is divided: a third of such tests.
+        # All lengths times the speed along the normal, so that nothing is divided: a third of these tests.
         away = rate * at - depth * here.way
         reach, off = radius * rate, 2.0 * _BESIDE * _NEAR_PLACE * here.slow
         return meets & (not ((rate > 2.0 * here.slow) & _is_beside(away, half, reach, off, rate)))
@@ -287,25 +287,25 @@ def _is_beside(away, half, reach, off, unit):
         half: the vector of the half.
         reach: the radius of the ball.
         off: the largest error of the place.
-        unit: the largest error of the middle, in the unit of the others.
+        unit: the largest error of the middle, in the unit of the other arguments.
     """
     ball = reach + off
     return (square(away) > ball * ball) | (dot(half, away) < -(reach + _LONGEST * (off + unit)))
 
 
 def _passes_in_curve(here, at, level, half, radius):
-    """As `passes` of a parabola, or of what is near to one: its level is depth + rate s + bend s^2 at the part s."""
+    """Whether a flight that is nearly a parabola passes: its level is depth + rate s + bend s^2 at the part s."""
     (depth, rate, bend), off, bends, farther = level, 0.0, 0.0, 0.0
     if here.curve is not None:
         off, bends, farther = _FULL * here.curve.off, _FULL * here.curve.bends, here.curve.off
     rises, falls = select(bend > 0.0, bend, 0.0), select(bend < 0.0, -bend, 0.0)
-    # The level is that give or take `more`.
+    # The level is within `more` of this parabola.
     more, most, least = here.slow + off + _NEAR, rate + rises, rate - falls
     grows, reaches = most + rises + here.slow + bends > 0.0, depth + select(most > 0.0, most, 0.0) >= -more
-    # What is behind the plane comes back first.
+    # A flight behind the plane comes back first.
     comes_back = (bend > -(here.weak + bends)) & (depth + select(least < 0.0, least, 0.0) <= more)
     meets = grows & reaches & ((depth <= _NEAR) | comes_back)
-    # Where it comes through the plane its level rises by 2 root. It is near to 0 for so short a time only, unless it
+    # Where it crosses the plane its level rises by 2 root. Only during a short time is it near 0, unless it
     # comes back.
     b = 0.5 * rate
     below = b * b - bend * depth
@@ -314,13 +314,13 @@ def _passes_in_curve(here, at, level, half, radius):
     root = np.sqrt(select(is_known, below, 0.0))
     part = -depth / select(is_known, b + root, 1.0)
     away = root * (at + part * (here.way + part * here.bent))
-    # Times the root, so that little is divided.
+    # Times the root, to avoid divisions.
     length = (here.slow + 2.0 * here.weak) * (1.0 / (_FULL * _OFF_SPEED))
     error = (farther + _NEAR_PLACE) * root + length * more
     meets = meets & (not (is_known & _is_beside(away, half, radius * root, error, root)))
     if here.curve is None:
         return meets
-    # Around the middle between its ends it is in a ball.
+    # It is in a ball around the middle between its ends.
     middle, reach = at + 0.5 * (here.way + here.bent), radius + here.curve.reach + _NEAR_PLACE
     return meets & (square(middle) <= reach * reach)
 

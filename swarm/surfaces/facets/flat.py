@@ -1,16 +1,16 @@
-"""Flat faces of a mesh: the planes of its triangles, and what is in one of them."""
+"""Flat faces of a mesh: the planes of its triangles, and the triangles in one of them."""
 
 import numpy as np
 
 from ...state import Floats, Indices
 from .mending import edges_of, sizes
 
-# Digits to which triangles are in one plane, of a normal and of an offset in sizes of the mesh.
+# Digits to which triangles are coplanar, for a normal and for an offset in sizes of the mesh.
 DIGITS = 9
 
 
 def planes_of(corners: Floats, triangles: Indices) -> Floats:
-    """The planes of triangles, each once: rows of their unit normals to the outside, and offsets along these [m]."""
+    """Return the planes of triangles, each once: rows of unit normals to the outside, and offsets along these [m]."""
     a, b, c = np.moveaxis(corners[triangles], 1, 0)
     crossed = np.cross(b - a, c - a)
     normals = crossed / np.linalg.norm(crossed, axis=1)[:, None]
@@ -20,14 +20,14 @@ def planes_of(corners: Floats, triangles: Indices) -> Floats:
 
 
 def keys_of(planes: Floats, size: float) -> Floats:
-    """A number for each plane (n, 4), the same for planes that agree in `DIGITS`, and its negative for one turned over.
+    """Return a number for each plane (n, 4), equal for planes that agree in `DIGITS`, negative for one turned over.
 
     Args:
         planes: rows of unit normals and offsets [m].
-        size: of what they bound [m].
+        size: the size of the body that the planes bound [m].
     """
     x, y, z, offset = np.round(planes / [1.0, 1.0, 1.0, size], DIGITS).T
-    # One number is sorted in a tenth of the time of four; others agree in it by chance alone.
+    # Sorting one number takes a tenth of the time of four; two planes agree in it by chance alone.
     a, b, c, d = np.random.default_rng(0).random(4)
     return np.asarray(a * x + b * y + c * z + d * offset + 0.0)
 
@@ -47,14 +47,14 @@ def all_in_a_plane(corners: Floats, triangles: Indices) -> bool:
 
 
 def rim_of(corners: Floats, triangles: Indices, plane: Floats, count: int) -> Floats:
-    """Points (3, count) on the edges of what of a mesh is in a plane."""
+    """Return points (3, count) on the edges of the part of a mesh in a plane."""
     face = _within(corners, triangles, plane)
     edges, counts = edges_of(face)
     return _drawn(corners[edges[counts == 1]], count)
 
 
 def places_of(corners: Floats, triangles: Indices, plane: Floats, count: int) -> Floats:
-    """Points (3, count) on what of a mesh is in a plane."""
+    """Return points (3, count) on the part of a mesh in a plane."""
     return _drawn(corners[_within(corners, triangles, plane)], count)
 
 
@@ -63,7 +63,7 @@ def _within(corners: Floats, triangles: Indices, plane: Floats) -> Indices:
 
 
 def _drawn(simplices: Floats, count: int) -> Floats:
-    """Points (3, count) of edges or triangles (n, corners, 3): as many of each."""
+    """Return points (3, count) of edges or triangles (n, corners, 3): equally many of each."""
     random = np.random.default_rng(1)
     shares = random.dirichlet(np.ones(simplices.shape[1]), count)
     return np.asarray((shares[:, :, None] * simplices[np.arange(count) % len(simplices)]).sum(axis=1).T)

@@ -1,8 +1,8 @@
-"""What is free around each cell of a grid of facets: most cells are empty, and a flight leaps through blocks of these.
+"""The free blocks around the cells of a grid of facets: most cells are empty, and a flight leaps through these.
 
-A row of `FacetCells.room` are eight whole numbers. Of an empty cell: how many cells before and behind it along x, y, z
-are empty too, all together a block, and whether it is admissible. Of a cell with facets: a cone of their normals, and
-how many of its entries are spare.
+Each row of `FacetCells.room` is eight whole numbers. For an empty cell: how many cells before and behind it along x,
+y, z are empty too, all together a block, and whether it is admissible. For a cell with facets: a cone of their
+normals, and the number of its spare entries.
 """
 
 from typing import Any
@@ -15,39 +15,39 @@ from ...kernel.jit import kernel, outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import Vec, dot, norm
 
-# The seventh number, of cells that hold facets, that are admissible and that are not; the eighth of a cone, and the
-# fourth of a cell with facets.
+# The place of the kind of a cell (it holds facets, is admissible, or is not), of the sine of a cone, and of the number
+# of spare entries of a cell with facets.
 KIND, SINE, _SPARE = 6, 7, 3
 FULL, FREE, CLOSED = 0, 1, -1
 _FULL = 127.0
-# A sine that no cone has: normals in all directions. Of the others a little more than they are, for whole numbers.
+# A sine that no cone has: normals in all directions. Other sines are enlarged a little, for whole numbers.
 _WIDEST, _MORE = 126.0, 3.0
-# The sine of a cone that every flight leaves, however its velocity changes.
+# The sine of a cone that every flight leaves, for any change of its velocity.
 _LEFT = -2.0 * _FULL
 # The farthest leap, in cells, and the longest step of a block that grows.
 _FARTHEST, _LONGEST = 120, 64
 
 
 class FreeCells(Record):
-    """The cells around one that a flight may leap through, along x, y, z."""
+    """The cells around a cell that a flight may leap through, along x, y, z."""
 
     back: Vec
     ahead: Vec
 
 
 class NormalCone(Record):
-    """A cone of normals: its axis, and the sine of its half-angle, of which each is a part of `_FULL`."""
+    """A cone of normals: its axis, and the sine of its half-angle, both in units of 1/`_FULL`."""
 
     axis: Vec
     sine: float
 
     def is_left(self, v, change=0.0):
-        """Whether a flight surely moves away from all that have these normals, while v changes by so much at most."""
+        """Whether a flight surely moves away from facets with these normals, while v changes by at most `change`."""
         return dot(self.axis, v) + _FULL * change < -self.sine * (norm(v) + change)
 
 
 def room_of(rows, cell):
-    """The room around a cell, none around one with facets."""
+    """Return the free cells around a cell, none around one with facets."""
     free = 1.0 if rows[cell, KIND] != FULL else 0.0
     return FreeCells(
         free * Vec(float(rows[cell, 0]), float(rows[cell, 2]), float(rows[cell, 4])),
@@ -56,19 +56,19 @@ def room_of(rows, cell):
 
 
 def cone_of(rows, cell):
-    """The cone of the normals of a cell; of one without facets it is one that every flight leaves."""
+    """Return the cone of the normals of a cell; without facets one that every flight leaves."""
     is_full = rows[cell, KIND] == FULL
     axis = Vec(float(rows[cell, 0]), float(rows[cell, 1]), float(rows[cell, 2]))
     return NormalCone(select(is_full, 1.0, 0.0) * axis, select(is_full, float(rows[cell, SINE]), _LEFT))
 
 
 def spare_of(rows, cell):
-    """How many entries of a cell are spare."""
+    """Return the number of spare entries of a cell."""
     return select(rows[cell, KIND] == FULL, int(rows[cell, _SPARE]), 0)
 
 
 def rows_of(counts: NDArray[np.int32], places: NDArray[np.int32]) -> NDArray[np.int8]:
-    """The rows of cells with so many entries in so many places: empty ones have no room."""
+    """Return the rows of cells with `counts` entries in `places` places: empty cells have no block."""
     rows = np.zeros((len(counts), 8), np.int8)
     rows[:, KIND] = np.where(counts > 0, FULL, FREE)
     rows[:, _SPARE] = places - counts
@@ -76,7 +76,7 @@ def rows_of(counts: NDArray[np.int32], places: NDArray[np.int32]) -> NDArray[np.
 
 
 def without_entries(rows: NDArray[np.int8]) -> NDArray[np.int8]:
-    """The rows where no cell has an entry."""
+    """Return the rows for cells without entries."""
     rows = rows.copy()
     rows[rows[:, KIND] == FULL, _SPARE] = 0
     return rows
@@ -86,10 +86,10 @@ def with_cones(rows: NDArray[np.int8], normals: NDArray[Any], entries: NDArray[A
     """Write the cones of the cells with facets.
 
     Args:
-        rows: those of all cells.
+        rows: the rows of all cells.
         normals: (T, 3) of the facets.
-        entries: of all cells.
-        first: where those of each cell begin.
+        entries: the entries of all cells.
+        first: where the entries of each cell begin.
     """
     full = np.flatnonzero(rows[:, KIND] == FULL)
     counts = (first[1:] - first[:-1])[full] - rows[full, _SPARE]
@@ -120,7 +120,7 @@ def with_blocks(rows: NDArray[np.int8], held: NDArray[np.bool_]) -> None:
 
 @kernel
 def _grow(rows, sums, leaps):
-    """A block around every free cell, which grows in all directions by turns."""
+    """Grow a block around every free cell, in all directions by turns."""
     nx, ny, nz = leaps.shape
     for x in range(nx):
         for y in range(ny):
@@ -156,7 +156,7 @@ def _grow_one(rows, cell, sums, place, leap):
 
 
 def _sum(sums, x0, x1, y0, y1, along_z):
-    """How many cells of a block hold facets."""
+    """Return the number of cells of a block that hold facets."""
     z0, z1 = along_z
     a, b, c, d = index(x0), index(x1), index(y0), index(y1)
     e, f = index(z0), index(z1)

@@ -1,4 +1,4 @@
-"""The facets of a mesh as kernels take them: which is met first, and which are near."""
+"""The facets of a mesh in kernels: the first facet that a flight meets, and the facets near a point."""
 
 import math
 from typing import Any
@@ -20,15 +20,15 @@ from .facet_cells import BLOCK, blocks_of, flight_in, from_middle, passes
 from .free_room import CLOSED, FREE, FULL, KIND, room_of, with_blocks, with_cones, without_entries
 from .nearest import foot_on, nearest
 
-# So many cells and blocks of cells are crossed before a flight is said to be free so far.
+# The most cells and blocks of cells that are crossed before a flight is reported as free up to there.
 _MOST = 4000
-# Facets are on one plane up to this sine of the angle between them. A place is on a plane up to this distance from it,
-# in units of round-off. Of two facets one is nearer where their distances differ by this part.
+# Facets are coplanar up to this sine of the angle between them. A place is on a plane up to this distance from it,
+# in units of round-off. One of two facets is nearer if their distances differ by this part.
 _PARALLEL, _ON, _NEARER = 1e-9, 1.0, 1e-9
 
 
 class Facets(Members, Patched):
-    """The facets of a mesh: walls on one side, each between its edges; what is known of their grid is `FacetCells`."""
+    """The facets of a mesh: walls on one side, each between its edges; the data of their grid are `FacetCells`."""
 
     in_blocks = True
 
@@ -37,12 +37,12 @@ class Facets(Members, Patched):
         return self._replace(grid=without._replace(known=known._replace(room=without_entries(known.room))))
 
     def ask_for(self, m):
-        """Ask for what is known of a facet, before its corners."""
+        """Prefetch the data of a facet, before its corners."""
         fetch(self.table, m * self.table.shape[1])
         fetch(self.like.corners.triangles, self.like.corners.row(m) * 3)
 
     def ask_for_corners(self, m):
-        """Ask for its corners."""
+        """Prefetch the corners of a facet."""
         corners = self.like.corners
         for k in range(3):
             fetch(corners.vertices, index(corners.triangles[corners.row(m), k]) * 3)
@@ -52,7 +52,7 @@ class Facets(Members, Patched):
 
     @outlined
     def field_hit(self, gravity, r, v):
-        """The first hit, from cell to cell, or how far the flight is surely free."""
+        """Return the first hit, from cell to cell, or the time until which the flight is surely free."""
         cells, t = self.grid, 0.0
         place, pace = r, v
         for _cell in range(_MOST):
@@ -74,7 +74,7 @@ class Facets(Members, Patched):
         return flights.Hit(t, -1.0)
 
     def tree(self):
-        """What `foot_on` finds the nearest triangle of a closed mesh by."""
+        """Return the data by which `foot_on` finds the nearest triangle of a closed mesh."""
         shared = self.like.corners
         return shared.vertices, shared.triangles, self.grid.known.boxes
 
@@ -92,10 +92,10 @@ class Facets(Members, Patched):
 
     @outlined
     def deepest_in_cell(self, r):
-        """The largest distance behind any facet, or that behind the nearest one that a point is before or behind.
+        """Return the largest depth behind any facet, or the depth behind the facet nearest to the point.
 
-        At a sharp ridge what is before one of its facets is behind the other. Of a point that is lost behind a closed
-        mesh it is the distance from that.
+        At a sharp ridge a point before one of its facets is behind the other. For a point that is lost behind a closed
+        mesh it is the distance from the mesh.
         """
         cell = cell_of(self.grid, r)
         first, stop = entries_of(self.grid, cell.number)
@@ -114,7 +114,7 @@ class Facets(Members, Patched):
                 near, depth_there = abs(depth), depth
         deepest = most if most <= near else depth_there
         if self.grid.known.boxes is not None:
-            # All facets are looked at only for a point that may be lost: not where one that it is before is as near as
+            # All facets are tested only for a point that may be lost: not where a facet that it is before is as near as
             # another.
             is_lost = first == stop or behind < (1.0 - _NEARER) * ahead
             is_lost = is_lost and self.grid.known.room[index(cell.number), KIND] != FREE
@@ -141,7 +141,7 @@ class Facets(Members, Patched):
 
     @outlined
     def misses(self, m, seen, longest):
-        # What is past its plane, by however little, is asked how far.
+        # A place past its plane, by however little, needs the full test.
         facet = member(self, m)
         return (facet.phi(seen.r) <= 0.0) & facet.way_past(seen, longest).misses
 
@@ -154,14 +154,14 @@ class Facets(Members, Patched):
 
     @outlined
     def gives_way(self, m, r):
-        """Whether a flight to the plane of a facet goes on at r, which is nearer to one that is turned the other way.
+        """Whether a flight to the plane of a facet passes at r, which is nearer to one that is turned the other way.
 
-        Two of these meet at a saddle vertex. Each reaches beyond its edges by the round-off of places, and where both
-        do a flight between them would have no end. There the one is met to which the place belongs, or is nearer.
+        Two such facets meet at a saddle vertex. Each extends beyond its edges by the round-off of places; where both
+        do a flight between them would have no end. The facet that the place belongs to, or that is nearer, is met.
         """
         one, (first, stop) = member(self, m), entries_at(self.grid, r)
         room, within = self.like.room.value, one.within(r)
-        # Beyond an edge, by round-off: hardly a hit is there.
+        # Beyond an edge, by round-off: few hits are at such places.
         for k in range(first, stop if one.is_beyond(r, -room) else first):
             other = member(self, index(self.grid.entries[k]))
             turn = cross(one.normal, other.normal)
@@ -179,7 +179,7 @@ class Facets(Members, Patched):
 
     @outlined
     def wall_after(self, number, r, near):
-        """The facet that goes on with the plane of another one at a place, or -1."""
+        """Return the facet that continues the plane of another one at a place, or -1."""
         first, stop = entries_at(self.grid, r)
         normal, found, widest = self.wall(number).normal, -1.0, -near
         for k in range(first, stop):
@@ -193,7 +193,7 @@ class Facets(Members, Patched):
 
 
 def hit_in(facets, gravity, flight, cell, here):
-    """The first hit in a cell (its number, when it is left) of a flight (r, v)."""
+    """Return the first hit in a cell (its number, when it is left) of a flight (r, v)."""
     (r, v), (number, until) = flight, cell
     found, cells = flights.Hit(until, -1.0), facets.grid
     first, stop = entries_of(cells, number)
@@ -207,10 +207,10 @@ def hit_in(facets, gravity, flight, cell, here):
 
 
 def hit_of(facets, gravity, r, v, m):
-    """When a flight meets a facet, as a `Hit`."""
+    """Return when a flight meets a facet, as a `Hit`."""
     time, _hits = flights.hit(gravity, member(facets, m), r, v)
     room = facets.like.room.value
-    # Flights from one of two facets to the other, which is turned the other way, take no time.
+    # Flights between two facets that are turned against each other take no time.
     if time * time * square(v) <= room * room and facets.gives_way(m, r + displacement(gravity, v, time)):
         time = math.inf
     return flights.Hit(time, float(m))
@@ -226,13 +226,13 @@ def _passes(cells, number, k, here):
 
 
 def table_of_facets(corners: Floats) -> Floats:
-    """The normals and the offsets of facets with these corners (T, 3, 3), one in each row."""
+    """Return the normals and the offsets of facets with corners (T, 3, 3), one facet in each row."""
     normal = _normals(*np.moveaxis(corners, 1, 0))
     return aligned_copy(np.concatenate([normal, (normal * corners.mean(axis=1)).sum(axis=1)[:, None]], axis=1))
 
 
 def table_of_sides(corners: Floats, room: float) -> Floats:
-    """The numbers of both sides of sheets with these corners (T, 3, 3), side by side; `room` is round-off [m]."""
+    """Return the numbers of both sides of sheets with corners (T, 3, 3), side by side; `room` is round-off [m]."""
     table = aligned_copy(np.repeat(table_of_facets(corners), 2, axis=0))
     table[1::2] *= -1.0
     table[:, 3] -= THIN * room
@@ -240,7 +240,7 @@ def table_of_sides(corners: Floats, room: float) -> Floats:
 
 
 def _normals(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Unit normals of triangles, from the two shorter sides."""
+    """Return unit normals of triangles, from the two shorter sides."""
     sides = np.stack([b - a, c - b, a - c])
     longest = (sides**2).sum(axis=2).argmax(axis=0)
     every = np.arange(len(a))
@@ -249,7 +249,7 @@ def _normals(a: Floats, b: Floats, c: Floats) -> Floats:
 
 
 def with_room(facets: Facets, mesh: Any, is_solid: bool) -> Facets:
-    """The facets with what is free around each cell; with no `mesh` all that is empty is."""
+    """Return the facets with the free blocks around each cell; without a `mesh` all empty cells are free."""
     from scipy.ndimage import label
 
     grid = facets.grid
@@ -261,7 +261,7 @@ def with_room(facets: Facets, mesh: Any, is_solid: bool) -> Facets:
     if mesh is None:
         with_blocks(rows, held)
     elif count:
-        # The middle of one cell of each part says on which side it is.
+        # The middle of one cell of each part determines its side.
         labels, first = np.unique(parts.ravel(), return_index=True)
         first, labels = first[labels > 0], labels[labels > 0]
         places = np.array(np.unravel_index(first, shape), np.float64)

@@ -1,8 +1,8 @@
 """Repairs of files of triangles: unjoined corners, degenerate triangles, and triangles that are turned over.
 
-Readers that join corners within a fixed distance make a small body a point, and those that join none leave seams open:
-here equal corners are one, and then only corners of edges that are still open are joined, within a distance that grows
-with the mesh. No feature of a surface that is closed is touched.
+Readers that join corners within a fixed distance shrink a small body to a point, and readers that join none leave seams
+open: here equal corners are joined, and then only corners of edges that are still open, within a distance that grows
+with the mesh. No feature of a closed surface is changed.
 """
 
 import itertools
@@ -12,17 +12,17 @@ import numpy as np
 from ...state import Floats, Indices
 from .mesh_files import Soup
 
-# Corners of open edges are joined within this part of the diagonal of the mesh, a hundred times what float32 rounds,
-# and within this part of the shortest open edge, so that no edge vanishes.
+# Corners of open edges are joined within this part of the diagonal of the mesh, a hundred times the round-off of
+# float32, and within this part of the shortest open edge, so that no edge vanishes.
 _WELD, _OF_EDGE = 1e-5, 0.25
-# Of the square of its longest edge, the area of a triangle that has none: round-off of float64.
+# The least area of a triangle, as a part of the square of its longest edge: round-off of float64.
 _NO_AREA = 1e-14
 # Rounds in which triangles are split at corners on their open edges, one edge of each in a round.
 _ROUNDS = 30
 
 
 def joined(soup: Soup) -> Soup:
-    """Each corner once, and no triangle twice or with two equal corners."""
+    """Return the triangles with each corner once, and no triangle twice or with two equal corners."""
     order = np.lexsort(soup.vertices.T)
     first = np.ones(len(order), np.bool_)
     first[1:] = (soup.vertices[order[1:]] != soup.vertices[order[:-1]]).any(axis=1)
@@ -32,7 +32,7 @@ def joined(soup: Soup) -> Soup:
 
 
 def proper(soup: Soup) -> Soup:
-    """Triangles of three corners, each once: those turned the other way are others."""
+    """Return the triangles of three different corners, each once; a triangle and its reverse are different."""
     a, b, c = soup.triangles.T
     whole = np.flatnonzero((a != b) & (b != c) & (c != a))
     found = soup.triangles[whole]
@@ -42,10 +42,10 @@ def proper(soup: Soup) -> Soup:
 
 
 def seams_closed(soup: Soup, weld: float | None) -> tuple[Soup, float, float | None]:
-    """The triangles with open edges closed: also how far a corner was moved, and within which distance.
+    """Return the triangles with open edges closed, the largest move of a corner, and the distance for joining.
 
-    Corners of open edges within a distance of each other are one, and a triangle with another's corner on its
-    open edge, within that distance, is two.
+    Corners of open edges within this distance of each other are joined, and a triangle with a corner of another on its
+    open edge, within this distance, is split.
     """
     edges, counts = edges_of(soup.triangles)
     if not (counts == 1).any():
@@ -66,13 +66,13 @@ def seams_closed(soup: Soup, weld: float | None) -> tuple[Soup, float, float | N
 
 
 def _welded(soup: Soup, of: Indices, weld: float) -> tuple[Soup, float]:
-    """The triangles with these corners joined where they are within a distance, and how far one was moved."""
+    """Return the triangles with these corners joined within a distance, and the largest move of a corner."""
     from scipy.spatial import KDTree
 
     vertices = soup.vertices
     pairs = KDTree(vertices[of]).query_pairs(weld, output_type="ndarray")
     group = components(pairs, len(of))
-    # The first of a group, in the order of their coordinates, stands for all.
+    # The first corner of a group, in the order of coordinates, replaces all.
     place = np.arange(len(vertices))
     place[of] = of[np.unique(group, return_index=True)[1][group]]
     moved = np.linalg.norm(vertices[place[of]] - vertices[of], axis=1)
@@ -80,7 +80,7 @@ def _welded(soup: Soup, of: Indices, weld: float) -> tuple[Soup, float]:
 
 
 def _without_flat(soup: Soup) -> Soup:
-    """The triangles that have an area, where edges are open: one without lies along an edge, and closes nothing."""
+    """Return the triangles with an area, if edges are open: one without area lies along an edge, and closes nothing."""
     if (edges_of(soup.triangles)[1] == 2).all():
         return soup
     kept = have_area(soup.vertices, soup.triangles)
@@ -88,14 +88,14 @@ def _without_flat(soup: Soup) -> Soup:
 
 
 def without_flat(soup: Soup) -> Soup:
-    """The triangles that have an area, if they are closed without those that have none."""
+    """Return the triangles with an area, if they are closed without the rest."""
     kept = have_area(soup.vertices, soup.triangles)
     is_closed = len(kept) > 0 and bool((edges_of(soup.triangles[kept])[1] == 2).all())
     return soup.of(soup.triangles[kept], kept) if is_closed else soup
 
 
 def _split(soup: Soup, beside: float) -> Soup | None:
-    """Triangles split at corners on their open edges, along one edge of each; None if no triangle is split."""
+    """Return the triangles split at corners on their open edges, along one edge of each; None if none is split."""
     from scipy.spatial import KDTree
 
     edges, counts = edges_of(soup.triangles)
@@ -133,11 +133,11 @@ def _split(soup: Soup, beside: float) -> Soup | None:
     )
 
 
-# --- Which way triangles are turned ----------------------------------------------------------------------
+# --- Orientation of triangles ----------------------------------------------------------------------------
 
 
 def turned_alike(soup: Soup) -> tuple[Soup, Indices]:
-    """The triangles of a closed mesh, turned as their neighbours are, and the edges (E, 2) where that cannot be."""
+    """Return the triangles of a closed mesh, turned like their neighbours, and the edges (E, 2) where this fails."""
     ways, counts = np.unique(soup.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=0, return_counts=True)
     if not (counts > 1).any():
         return soup, ways[:0]
@@ -166,7 +166,7 @@ def turned_alike(soup: Soup) -> tuple[Soup, Indices]:
 
 
 def _passes(triangles: Indices, edges: Indices, pairs: Indices) -> Indices:
-    """At which edges both triangles pass in the same direction."""
+    """Return at which edges both triangles pass in the same direction."""
     found = []
     for side in pairs.T:
         corners = triangles[side]
@@ -179,7 +179,7 @@ def _passes(triangles: Indices, edges: Indices, pairs: Indices) -> Indices:
 
 
 def edges_of(triangles: Indices) -> tuple[Indices, Indices]:
-    """The edges (E, 2), each once, and how many triangles each has."""
+    """Return the edges (E, 2), each once, and the number of triangles of each."""
     found = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     most = int(found.max(initial=0)) + 1
     keys, counts = np.unique(found[:, 0] * most + found[:, 1], return_counts=True)
@@ -187,7 +187,7 @@ def edges_of(triangles: Indices) -> tuple[Indices, Indices]:
 
 
 def sizes(vertices: Floats, triangles: Indices) -> tuple[Floats, Floats]:
-    """The area of each triangle and its longest edge."""
+    """Return the area of each triangle and its longest edge."""
     corners = vertices[triangles]
     sides = np.roll(corners, -1, axis=1) - corners
     areas = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
@@ -195,13 +195,13 @@ def sizes(vertices: Floats, triangles: Indices) -> tuple[Floats, Floats]:
 
 
 def have_area(vertices: Floats, triangles: Indices) -> Indices:
-    """The triangles, by their numbers, that have an area."""
+    """Return the numbers of the triangles that have an area."""
     areas, longest = sizes(vertices, triangles)
     return np.flatnonzero(areas > _NO_AREA * longest**2)
 
 
 def components(pairs: Indices, count: int) -> Indices:
-    """Of so many, by these pairs (P, 2), the number of the group that each is in."""
+    """Return for each of `count` items the number of the group that it is in, by connected pairs (P, 2)."""
     from scipy.sparse import coo_matrix  # libigl needs it, so it is there
     from scipy.sparse.csgraph import connected_components
 
@@ -210,18 +210,18 @@ def components(pairs: Indices, count: int) -> Indices:
 
 
 def groups_of(pairs: Indices, count: int) -> list[Indices]:
-    """Which of so many hang together, by these pairs (P, 2)."""
+    """Return the groups of `count` items that are connected by pairs (P, 2)."""
     return parts_of(components(pairs, count))
 
 
 def parts_of(numbers: Indices) -> list[Indices]:
-    """Where each of the numbers is."""
+    """Return for each different number the places where it is."""
     order = np.argsort(numbers, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
 
 
 def neighbours(triangles: Indices) -> tuple[Indices, Indices]:
-    """The edges (E, 2) of a closed mesh, each once, and the two triangles (E, 2) of each."""
+    """Return the edges (E, 2) of a closed mesh, each once, and the two triangles (E, 2) of each."""
     edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     order = np.lexsort(edges.T)
     return edges[order[::2]], (order // 3).reshape(-1, 2)

@@ -37,13 +37,13 @@ from .nearest import boxes_of, nearest, within
 from .triangles import closed, sheets, sorted_by_place
 
 _NOUNS_OF_SHEETS = ("open mesh",) * 4
-# What a group may have of its own.
+# The arguments that a group may have of its own.
 LAWS_OF_GROUPS = tuple(name for name in LAWS if name != "rolling")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Mesh(Surface):
-    """A mesh of triangles that are walls, exactly: edges, corners and thin walls are what they are in the file.
+    """A mesh of triangles that are walls, exactly: edges, corners and thin walls are as in the file.
 
     It is closed, or with `open=True` it is of sheets: each triangle is a wall from both sides. So are chutes, funnels,
     boxes without a lid. Particles go around their edges; which way a triangle is turned does not matter.
@@ -56,22 +56,22 @@ class Mesh(Surface):
         triangles: None with a path, else (T, 3) the numbers of their corners. They must enclose a volume, if not
             `open`; a part within an odd number of others is a cavity, whichever way its triangles are turned.
         side: "inside" or "outside" of the mesh, the admissible part; of sheets it is "outside", both sides of them.
-        open: whether the triangles are sheets; those that all lie in one plane always are. Their sides are 3e-11 of
-            the farthest coordinate from them, which tells on which one a point that touches a sheet is; balls touch
+        open: whether the triangles are sheets; triangles that all lie in one plane always are. The sides of a sheet are
+            3e-11 of the farthest coordinate from it, which determines the side of a point that touches it; balls touch
             the triangles themselves.
         center: where the origin of the file is, three numbers [m].
-        scale: what a unit of the file is in metres, 0.001 for millimetres.
-        weld: corners of open edges this near [m] are one, so that seams close; 0: none are. None: 1e-5 of the diagonal
+        scale: the length of a unit of the file in metres, 0.001 for millimetres.
+        weld: corners of open edges this near [m] are joined, so that seams close; 0: none. None: 1e-5 of the diagonal
             of the mesh, or a quarter of the shortest open edge if that is less.
         groups: laws by the names of solids (STL), groups or objects (OBJ, 3MF), or values of the property `group` of
             faces (PLY): {"shutter": {"temperature": 2.0}}, of restitution, friction, temperature, accommodation, laws;
-            a group that is left out has those of the mesh.
+            a group that is left out has the laws of the mesh.
         group: None, or (T,) the number of the group of each triangle.
-        names: of the groups.
+        names: the names of the groups.
         rotation: about the origin of the file.
 
-    Mended are: open seams, corners on the edges of others, triangles twice or without an area, and what is turned the
-    wrong way; `mesh_weld` is how far a corner was moved at most. The triangles are sorted by their groups and places.
+    These are mended: open seams, corners on the edges of others, triangles twice or without an area, and triangles that
+    are turned over; `mesh_weld` is the largest move of a corner. The triangles are sorted by their groups and places.
     Of sheets, edges that are nearer to each other than `weld` are a seam too.
 
     Raises:
@@ -99,7 +99,7 @@ class Mesh(Surface):
     names: Any = field(default=(), kw_only=True)
     mesh_weld: Magnitude | None = field(default=None, kw_only=True)
     open: Flag = field(default=False, kw_only=True, metadata={"younger": True})
-    # The arrays that need no mending, also in a copy with other laws.
+    # The mended arrays, also for a copy with other laws.
     _mended: Any = field(default=None, kw_only=True, compare=False, metadata={"in_file": False})
 
     def __post_init__(self) -> None:
@@ -128,7 +128,7 @@ class Mesh(Surface):
             )
 
     def _mend(self) -> None:
-        """Take the triangles of the file or the arrays, mended, in place of what was given."""
+        """Replace the file or the arrays by its mended triangles."""
         with needed_by("a mesh", "mesh"):
             import scipy.spatial  # noqa: F401
         path = Path("of these arrays")
@@ -139,7 +139,7 @@ class Mesh(Surface):
             soup = read_soup(path, self.scale)
         else:
             soup = given_arrays(self.vertices, self.triangles, self.group, self.names, self.scale)
-        # What is in a plane encloses nothing, so that it cannot be a closed mesh that is damaged.
+        # Triangles in a plane enclose nothing, so they cannot be a damaged closed mesh.
         is_open = self.open or all_in_a_plane(soup.vertices, soup.triangles)
         soup, moved = (sheets if is_open else closed)(path, soup, self.weld)
         mesh = sorted_by_place(soup)
@@ -150,7 +150,7 @@ class Mesh(Surface):
         checks.assign(self, **own, **settled, _mended=tuple(own.values()))
 
     def _checked_groups(self) -> dict[str, dict[str, Any]] | None:
-        """The argument `groups`."""
+        """Return the argument `groups`, checked."""
         if self.groups is None:
             return None
         if not isinstance(self.groups, Mapping):
@@ -169,7 +169,7 @@ class Mesh(Surface):
         return len(self.triangles)
 
     def __repr__(self) -> str:
-        """The number of triangles, and what is not a default."""
+        """Return the number of triangles, and the arguments that differ from their defaults."""
         own = ("open" if self.open else "side", "center", "groups", "mesh_weld", *(one.name for one in fields(Surface)))
         return self._call([f"<{len(self)} triangles>"], [one for one in fields(self) if one.name in own])
 
@@ -177,7 +177,7 @@ class Mesh(Surface):
 
     @cached_property
     def corners(self) -> Floats:
-        """The vertices (V, 3) where they are in the scene [m]."""
+        """Return the vertices (V, 3) in the scene [m]."""
         if self.rotation is None and not any(self.center):
             return np.asarray(self.vertices)
         turned = self.vertices @ rotations.matrix(self.rotation).T if self.rotation is not None else self.vertices
@@ -185,7 +185,7 @@ class Mesh(Surface):
 
     @cached_property
     def members(self) -> Facets:
-        """The facets as kernels take them."""
+        """Return the facets as a record for kernels."""
         corners = self.corners[self.triangles if self.side == "inside" else self.triangles[:, ::-1]]
         zero, room = Vec(0.0, 0.0, 0.0), self._room
         shared = self.corners, self.triangles, side_sign(self.side)
@@ -201,14 +201,14 @@ class Mesh(Surface):
 
     @property
     def _margin(self) -> float:
-        """The part of a cell that a flight ends beyond its wall."""
+        """Return the part of a cell by which a flight ends beyond its wall."""
         accelerates = motions.Rotation, motions.Oscillation, motions.Path
         moves = any(isinstance(one, accelerates) for one in motions.parts_of(self.motion))
         return MOVING_MARGIN if moves else MARGIN
 
     @property
     def _room(self) -> float:
-        """The round-off of places [m]."""
+        """Return the round-off of places [m]."""
         return ROOM * float(np.abs(self.corners).max())
 
     @cached_property
@@ -228,7 +228,7 @@ class Mesh(Surface):
         return (made[largest],)
 
     def faces_of_balls(self, largest: float) -> tuple[Members, Indices]:
-        """As `ManyBodies.faces_of_balls`: triangles in one plane, and those of a convex body."""
+        """As `ManyBodies.faces_of_balls`: coplanar triangles, and triangles of a convex body."""
         corners, face = faces_of(self.corners, self.triangles, 0.0 if self.open else -side_sign(self.side))
         return triangles_of_balls(corners, largest), face
 
@@ -239,11 +239,11 @@ class Mesh(Surface):
         return super().lost(points, time) if self.open else ~self.contain(np.array(self._own_rows(points, time)))
 
     def wall_count(self, of_balls: bool) -> int:
-        # Of points the two sides of a sheet are each a wall.
+        # For points the two sides of a sheet are each a wall.
         return len(self) * (2 if self.open and not of_balls else 1)
 
     def numbers(self) -> list[int]:
-        """The number of every triangle."""
+        """Return the number of every triangle."""
         return list(range(len(self)))
 
     def runs(self, walls: int = 0) -> list[tuple[Surface, int]]:
@@ -273,7 +273,7 @@ class Mesh(Surface):
         own = plane[:3] if self.rotation is None else plane[:3] @ rotations.matrix(self.rotation)
         vertices = np.where(in_plane(self.corners, plane)[:, None], self.vertices + by * own, self.vertices)
         vertices.flags.writeable = False
-        # Nothing is to be mended, and triangles and faces keep their numbers.
+        # The copy needs no mending, and its triangles and faces keep their numbers.
         made = replace(self, vertices=vertices, _mended=(vertices, *self._mended[1:]))
         planes[number, 3] += by
         made.__dict__["_planes"] = planes
@@ -306,10 +306,10 @@ class Mesh(Surface):
         return float(np.linalg.norm(self.corners, axis=1).max())
 
     def volume(self) -> float:
-        """What the triangles enclose [m^3].
+        """Return the volume that the triangles enclose [m^3].
 
         Raises:
-            SceneError: they are sheets.
+            SceneError: the triangles are sheets.
         """
         if self.open:
             raise SceneError(
@@ -329,9 +329,9 @@ class Mesh(Surface):
     admits = contain
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
-        """The signed distance at points (3, N): below 0 inside, above 0 outside; shape (N,).
+        """Return the signed distance at points (3, N): below 0 inside, above 0 outside; shape (N,).
 
-        Of sheets it is that from the nearest side of one, above 0 but between these.
+        For sheets it is the distance from the nearest side of one, above 0 except between the sides.
         """
         found = np.asarray(self._nearest(points, time)[3])
         return found - THIN * self._room if self.open else found
@@ -346,7 +346,7 @@ class Mesh(Surface):
         if not self.open:
             nearest(self.members, self._tree, flat, found)
             return np.asarray(side_sign(self.side) * found.reshape(4, *np.shape(rows.x)))
-        # Of each triangle one side
+        # One side of each triangle
         members = self.members._replace(table=aligned_copy(self.members.table[::2]))
         nearest(members, self._tree, flat, found)
         return (found * np.where(found[3] < 0.0, -1.0, 1.0)).reshape(4, *np.shape(rows.x))

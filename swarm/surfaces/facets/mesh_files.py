@@ -1,4 +1,4 @@
-"""The triangles of a file, or of arrays, as they are there, with the names of solids, objects or groups."""
+"""The triangles of a file, or of arrays, unchanged, with the names of solids, objects or groups."""
 
 import itertools
 import re
@@ -17,7 +17,7 @@ from ..surface import shown
 _NUMBER = r"\s+([-+.\deEnaifNAIF]+)"
 _CORNER = re.compile(r"vertex" + 3 * _NUMBER, re.IGNORECASE)
 _SOLID = re.compile(r"^[ \t]*solid\b[ \t]*(.*)$", re.IGNORECASE | re.MULTILINE)
-# So much of a file is looked at to tell text from numbers.
+# This number of bytes of a file tells text from binary data.
 _HEAD = 4096
 
 
@@ -28,7 +28,7 @@ class Soup(NamedTuple):
         vertices: (V, 3) [m].
         triangles: (T, 3) their corners.
         group: (T,) the number of the group of each.
-        names: of the groups; of a file that names none, one that is empty.
+        names: the names of the groups; one empty name for a file without names.
     """
 
     vertices: Floats
@@ -37,16 +37,16 @@ class Soup(NamedTuple):
     names: tuple[str, ...]
 
     def of(self, triangles: Indices, which: Indices) -> "Soup":
-        """Other triangles, each of the group of the one with this number."""
+        """Return other triangles, each in the group of the triangle with this number."""
         return self._replace(triangles=triangles, group=self.group[which])
 
 
 def read_soup(path: Path, scale: float) -> Soup:
-    """The triangles in a file, which need not hang together.
+    """Return the triangles in a file, which need not be connected.
 
     Args:
-        path: of the file.
-        scale: what a unit of the file is in metres.
+        path: path of the file.
+        scale: length of a unit of the file in metres.
 
     Raises:
         SceneError: the file cannot be read, or holds no triangles, or some with corners that are not finite.
@@ -59,13 +59,13 @@ def read_soup(path: Path, scale: float) -> Soup:
     except SceneError:
         raise
     except ModuleNotFoundError as error:
-        # As trimesh raises it again, it has no name.
+        # An error that trimesh raises again has no name.
         name = error.name or str(error).rpartition(" ")[2].strip("'")
         raise SceneError(
             f"cannot read the mesh {path}: a file {path.suffix} needs the package {name!r}, which is not installed: "
             f"pip install {name}, or write the mesh as STL"
         ) from error
-    except Exception as error:  # what readers of a dozen formats raise
+    except Exception as error:  # readers of a dozen formats raise any error
         reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise SceneError(f"cannot read the mesh {path}: {reason}") from error
     if not len(triangles):
@@ -83,7 +83,7 @@ def read_soup(path: Path, scale: float) -> Soup:
 
 
 def _text_of(path: Path) -> str:
-    """A file of text; of any other nothing."""
+    """Return the text of an STL or OBJ file; the empty string for any other file."""
     if path.suffix.lower() not in (".stl", ".obj"):
         return ""
     with path.open("rb") as file:
@@ -96,7 +96,7 @@ def _text_of(path: Path) -> str:
 
 
 def _stl(text: str) -> tuple[Floats, Indices, Indices, list[str]]:
-    """The solids of an STL file, each between `solid name` and `endsolid`."""
+    """Return the solids of an STL file, each between `solid name` and `endsolid`."""
     _before, *parts = _SOLID.split(text)
     found, group, names = [], [], []  # type: ignore[var-annotated]
     for name, body in zip(parts[::2], parts[1::2], strict=True):
@@ -111,7 +111,7 @@ def _stl(text: str) -> tuple[Floats, Indices, Indices, list[str]]:
 
 
 def _obj(text: str) -> tuple[Floats, Indices, Indices, list[str]]:
-    """The faces of an OBJ file, as fans of triangles, each of the group or else the object above it."""
+    """Return the faces of an OBJ file, as fans of triangles, each of the group or else the object above it."""
     vertices: list[list[float]] = []
     faces: list[tuple[int, int, int]] = []
     group: list[int] = []
@@ -137,7 +137,7 @@ def _obj(text: str) -> tuple[Floats, Indices, Indices, list[str]]:
 
 
 def _number_of(name: str, names: list[str]) -> int:
-    """The number of a group by its name; a name that is not yet in `names` is appended."""
+    """Return the number of a group by its name; a name that is not yet in `names` is appended."""
     if name not in names:
         names.append(name)
     return names.index(name)
@@ -147,7 +147,7 @@ def _number_of(name: str, names: list[str]) -> int:
 
 
 def _by_library(path: Path) -> tuple[Floats, Indices, Indices, list[str]]:
-    """What trimesh reads: each object is a group; of a PLY file each value of its faces' property `group`."""
+    """Return the triangles that trimesh reads: a group for each object, or for each value of `group` of a PLY file."""
     with needed_by("a mesh", "mesh"):
         import trimesh
     read: Any = trimesh.load(str(path), process=False)
@@ -183,7 +183,7 @@ def _by_library(path: Path) -> tuple[Floats, Indices, Indices, list[str]]:
 
 
 def _values_of(mesh: Any, count: int) -> Any:
-    """The property `group` of the faces of a PLY file, or None."""
+    """Return the property `group` of the faces of a PLY file, or None."""
     data = mesh.metadata.get("_ply_raw", {}).get("face", {}).get("data")
     names = () if data is None or getattr(data, "dtype", None) is None else data.dtype.names or ()
     if isinstance(data, dict):
@@ -196,7 +196,7 @@ def _values_of(mesh: Any, count: int) -> Any:
 
 
 def given_arrays(vertices: Any, triangles: Any, group: Any, names: Any, scale: float) -> Soup:
-    """The arguments that are arrays, checked."""
+    """Return the arguments that are arrays, checked."""
     if triangles is None:
         raise SceneError("triangles must be (T, 3) numbers of corners, got None; or give the path of a file alone")
     corners = checks.array("vertices", vertices)
@@ -224,7 +224,7 @@ def given_arrays(vertices: Any, triangles: Any, group: Any, names: Any, scale: f
 
 
 def _whole(name: str, values: Any) -> NDArray[Any]:
-    """An argument as an array of whole numbers, at least one."""
+    """Return an argument as an array of whole numbers, at least one."""
     try:
         found = np.asarray(values)
     except Exception:  # rows of different lengths, or an object of others

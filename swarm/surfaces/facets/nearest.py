@@ -1,4 +1,4 @@
-"""The signed distance from a mesh: which triangle is nearest to a point, and on which side of it that is."""
+"""The signed distance from a mesh: the triangle nearest to a point, and the side of it that the point is on."""
 
 import math
 
@@ -12,18 +12,18 @@ from ...kernel.vector import Vec, column, cross, dot, norm, put, square
 from ..fields.members import SignedDistance
 from .free_room import FREE, FULL, KIND
 
-# Of a squared distance, the part by which those from two triangles that share a corner or an edge differ, and that of
-# the distance of their feet: round-off.
+# Squared distances from two triangles that share a corner or an edge differ by up to the first part, and the squared
+# distance of their feet is up to the second: round-off.
 _TIE, _SAME = 1e-9, 1e-18
-# Triangles of a leaf of the tree, and how many boxes may wait at once.
+# Triangles of a leaf of the tree, and the most boxes that wait at once.
 _LEAF, _DEEPEST = 8, 96
 
 
 class NearestTriangle(Record):
-    """The nearest triangle so far: the squared distance, the foot, which one it is, and its pseudonormal.
+    """The nearest triangle so far: the squared distance, the foot, its number, and its pseudonormal.
 
-    That is the sum of the normals of all triangles that meet at the foot, each times its angle there, and says on which
-    side a point is (Baerentzen and Aanaes, IEEE Trans. Vis. Comput. Graph. 11 (2005) 243).
+    The pseudonormal is the sum of the normals of all triangles that meet at the foot, each times its angle there; its
+    sign tells the side of a point (Baerentzen and Aanaes, IEEE Trans. Vis. Comput. Graph. 11 (2005) 243).
     """
 
     square: float
@@ -32,25 +32,25 @@ class NearestTriangle(Record):
     normal: Vec
 
     def height(self, r):
-        """A number above 0 outside."""
+        """Return a number that is above 0 outside."""
         return dot(self.normal, r - self.foot)
 
 
 @outlined
 def foot_on(facets, mesh, r):
-    """The `SignedDistance` of a point: the signed distance along the normals of the facets, and its gradient."""
+    """Return the `SignedDistance` of a point: the signed distance along the normals of the facets, and its gradient."""
     near = _nearest(facets, mesh, r)
     normal, height = _row(facets.table, int(near.which)), near.height(r)
     away = norm(r - near.foot)
     sign = 1.0 if height > 0.0 else -1.0
-    # On a facet the way from the foot is round-off, and leads anywhere.
+    # On a facet the vector from the foot is round-off, of any direction.
     is_off = away > facets.like.room.value and height != 0.0
     return SignedDistance(sign * away, (r - near.foot) * (sign / away) if is_off else normal)
 
 
 @kernel
 def nearest(facets, mesh, points, found):
-    """The gradient and the signed distance of the points (3, N), in the rows of `found`.
+    """Write the gradient and the signed distance at points (3, N) into the rows of `found`.
 
     `mesh` are the vertices (V, 3), the triangles (T, 3) and the `boxes_of` these.
     """
@@ -62,7 +62,7 @@ def nearest(facets, mesh, points, found):
 
 @kernel
 def within(facets, mesh, points, found):
-    """Whether each of the points (3, N) is admissible, and not on the mesh, into `found`."""
+    """Write whether each of the points (3, N) is admissible, and not on the mesh, into `found`."""
     cells = facets.grid
     for i in range(points.shape[1]):
         r = column(points, 0, i)
@@ -73,7 +73,7 @@ def within(facets, mesh, points, found):
 
 @outlined
 def _nearest(facets, mesh, r):
-    """The nearest triangle: through the tree, of two boxes the nearer one first."""
+    """Return the nearest triangle: through the tree, the nearer of two boxes first."""
     boxes, count = mesh[2], mesh[1].shape[0]
     leaves, waiting, last = boxes.shape[0] // 2, scratch(_DEEPEST, np.int64), 1
     near = NearestTriangle(math.inf, r, 0.0, r)
@@ -97,7 +97,7 @@ def _nearest(facets, mesh, r):
 
 
 def _away(boxes, k, r):
-    """The squared distance of a point from a box."""
+    """Return the squared distance of a point from a box."""
     k = index(k)
     x = max(float(boxes[k, 0]) - r.x, r.x - float(boxes[k, 3]))
     y = max(float(boxes[k, 1]) - r.y, r.y - float(boxes[k, 4]))
@@ -107,7 +107,7 @@ def _away(boxes, k, r):
 
 @outlined
 def _nearer(facets, mesh, r, m, near):
-    """The nearer one of the nearest triangle so far and this one; both, where they meet at the foot."""
+    """Return the nearer of the nearest triangle so far and this one; both combined, if they meet at the foot."""
     vertices, triangles = mesh[0], mesh[1]
     a, b, c = (_row(vertices, triangles[m, k]) for k in range(3))
     foot = _foot(r, a, b, c)
@@ -118,7 +118,7 @@ def _nearer(facets, mesh, r, m, near):
 
 
 def _angle_at(foot, a, b, c):
-    """The angle of a triangle at a point of it: that at a corner, or half a turn at an edge."""
+    """Return the angle of a triangle at a point of it: the angle of a corner, or half a turn elsewhere."""
     at_a, at_b = square(foot - a) == 0.0, square(foot - b) == 0.0
     if not (at_a or at_b or square(foot - c) == 0.0):
         return math.pi
@@ -132,7 +132,7 @@ def _row(rows, k):
 
 
 def _foot(r, a, b, c):
-    """The point of a triangle that is nearest to r (Ericson, Real-Time Collision Detection, 5.1.5)."""
+    """Return the point of a triangle nearest to r (Ericson, Real-Time Collision Detection, 5.1.5)."""
     ab, ac, ap = b - a, c - a, r - a
     d1, d2 = dot(ab, ap), dot(ac, ap)
     if d1 <= 0.0 and d2 <= 0.0:
@@ -159,9 +159,9 @@ def _foot(r, a, b, c):
 
 
 def boxes_of(corners):
-    """A tree of boxes (lowest and highest corner): box k holds 2 k and 2 k + 1, and the last half so many triangles.
+    """Return a tree of boxes (lowest and highest corner): box k holds 2 k and 2 k + 1, the last half `_LEAF` triangles.
 
-    `corners` (T, 3, 3) are those of triangles in such an order that those in a row are near to each other.
+    `corners` (T, 3, 3) are the corners of triangles in an order in which consecutive ones are near to each other.
     """
     count = -(-len(corners) // _LEAF)
     leaves = 1 << max(count - 1, 0).bit_length()
@@ -175,7 +175,7 @@ def boxes_of(corners):
         leaves //= 2
         boxes[leaves : 2 * leaves, :3] = pairs[:, :, :3].min(axis=1)
         boxes[leaves : 2 * leaves, 3:] = pairs[:, :, 3:].max(axis=1)
-    # Rounded outwards, so that none is smaller than what it holds
+    # Rounded outwards, so that no box is smaller than its triangles
     rounded, less = boxes.astype(np.float32), np.array(3 * [-np.inf] + 3 * [np.inf], np.float32)
     inwards = np.where(less < 0.0, rounded > boxes, rounded < boxes)
     return np.where(inwards, np.nextafter(rounded, less), rounded)

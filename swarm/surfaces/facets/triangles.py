@@ -12,23 +12,23 @@ from ..surface import shown
 from .mending import edges_of, groups_of, have_area, joined, neighbours, seams_closed, turned_alike, without_flat
 from .mesh_files import Soup, read_soup
 
-# Corners of a part that are looked up in another one, about.
+# About this number of corners of a part are tested against another part.
 _LOOKED_UP = 16
-# So many holes are listed.
+# At most this number of holes is listed.
 _LISTED = 5
 # Bits of a place along each axis, by which triangles are sorted.
 _BITS = 20
 
 
 def read_mesh(path: Path, scale: float, weld: float | None) -> tuple[Soup, float]:
-    """The mesh in a file, and how far a corner was moved at most to close seams [m].
+    """Return the mesh in a file, and the largest move of a corner to close seams [m].
 
-    Its triangles enclose a volume; seen from outside their corners are counter-clockwise.
+    The triangles enclose a volume; seen from outside their corners are counter-clockwise.
 
     Args:
-        path: of the file.
-        scale: what a unit of the file is in metres.
-        weld: the distance within which corners of open edges are one [m]; None: one that suits the mesh.
+        path: path of the file.
+        scale: length of a unit of the file in metres.
+        weld: the distance within which corners of open edges are joined [m]; None: one that suits the mesh.
 
     Raises:
         SceneError: the file holds no mesh, or one that is not closed, has triangles that cannot be turned the same
@@ -38,11 +38,11 @@ def read_mesh(path: Path, scale: float, weld: float | None) -> tuple[Soup, float
 
 
 def closed(path: Path, soup: Soup, weld: float | None) -> tuple[Soup, float]:
-    """The mesh that triangles make, as `read_mesh` returns it."""
+    """Return the closed mesh of triangles, as `read_mesh` does."""
     soup, moved, within = seams_closed(joined(soup), weld)
     edges, counts = edges_of(soup.triangles)
     if not len(soup.triangles) or (counts != 2).any():
-        # A triangle along an edge, of no area, that closes nothing
+        # Removes a triangle along an edge, of no area, that closes nothing
         soup = without_flat(soup)
         edges, counts = edges_of(soup.triangles)
         if not len(soup.triangles) or (counts != 2).any():
@@ -58,7 +58,7 @@ def closed(path: Path, soup: Soup, weld: float | None) -> tuple[Soup, float]:
 
 
 def sheets(path: Path, soup: Soup, weld: float | None) -> tuple[Soup, float]:
-    """The sheets that triangles make, each triangle once; their corners are joined as those of a closed mesh are."""
+    """Return the sheets of triangles, each triangle once; their corners are joined as in a closed mesh."""
     soup, moved, _within = seams_closed(joined(soup), weld)
     _corners, first = np.unique(np.sort(soup.triangles, axis=1), axis=0, return_index=True)
     kept = np.sort(first)
@@ -69,7 +69,7 @@ def sheets(path: Path, soup: Soup, weld: float | None) -> tuple[Soup, float]:
 
 
 def _of_used(soup: Soup) -> Soup:
-    """The triangles with the corners that they use."""
+    """Return the triangles with only the corners that they use."""
     used, turned = np.unique(soup.triangles, return_inverse=True)
     return soup._replace(vertices=soup.vertices[used], triangles=turned.reshape(-1, 3))
 
@@ -108,7 +108,7 @@ def _refuse_open(path: Path, vertices: Floats, edges: Indices, counts: Indices, 
 
 
 def _outward(path: Path, soup: Soup) -> Soup:
-    """The triangles seen from outside: a part within an odd number of others is a cavity, however it is turned."""
+    """Return the triangles as seen from outside: a part within an odd number of others is a cavity, however turned."""
     vertices, triangles = soup.vertices, soup.triangles
     which = groups_of(neighbours(triangles)[1], len(triangles))
     parts = [triangles[some] for some in which]
@@ -148,7 +148,7 @@ def _is_within(path: Path, points: Floats, vertices: Floats, part: Indices) -> b
 
 
 def sorted_by_place(mesh: Soup) -> Soup:
-    """The triangles by their groups, those near to each other near: what a cell holds is in few lines of the cache."""
+    """Return the triangles by their groups, and near ones near: the entries of a cell are in few lines of the cache."""
     middles = mesh.vertices[mesh.triangles].mean(axis=1)
     low, wide = middles.min(axis=0), float(np.ptp(middles, axis=0).max()) or 1.0
     places = ((middles - low) * ((2**_BITS - 1) / wide)).astype(np.int64)

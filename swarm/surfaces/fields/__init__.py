@@ -1,1 +1,1 @@
-"""Many walls of one kind: arrays of their numbers, and a grid of cells that says which of them are near."""
+"""Many walls of one kind: arrays of their numbers, and a grid of cells that finds the near ones."""

@@ -1,4 +1,4 @@
-"""The fields of bodies by their kind: each body at its place, with its size and its rotation or axis."""
+"""The fields of bodies by their kind: each body with its place, its size and its rotation or axis."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,16 +19,16 @@ from .foam import Foam
 from .many import ManyBodies, field_of
 from .members import Members
 
-# Points of a circle in a plane.
+# The number of points of a circle in a plane.
 _CIRCLE = 97
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Spheres(ManyBodies):
-    """Many balls, one surface: the space outside of all of them, or a foam of cavities.
+    """Many balls, one surface: the space outside all of them, or a foam of cavities.
 
     Solid ones may overlap one another, and reach through other walls. With side="inside" particles are in any of them,
-    and go on from one into another where both overlap: bubbles of a foam, pores; the only surface of a scene.
+    and pass from one into another where both overlap: bubbles of a foam, pores; the only surface of a scene.
     Particles with a radius meet a foam of at most 64 bubbles.
 
     In a scene file: the arguments, or from = "packing.csv" with the columns x, y, z, radius.
@@ -97,7 +97,7 @@ class Spheres(ManyBodies):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Cylinders(ManyBodies):
-    """Many solid cylinders, endless or capped, one surface; the space outside of all of them.
+    """Many solid cylinders, endless or capped, one surface; the space outside all of them.
 
     They may overlap one another, and reach through other walls.
 
@@ -114,7 +114,7 @@ class Cylinders(ManyBodies):
     Raises:
         SceneError: an argument is out of its range.
 
-    Cost: a grid of cells finds the next one. One that is endless along no axis of the scene is in all cells.
+    Cost: a grid of cells finds the next cylinder. One that is endless along no axis of the scene is in all cells.
 
     >>> Cylinders([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], 0.25).phi([[0.25], [0.0], [7.0]])
     array([0.])
@@ -138,7 +138,7 @@ class Cylinders(ManyBodies):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Capsules(ManyBodies):
-    """Many solid capsules, one surface; the space outside of all of them.
+    """Many solid capsules, one surface; the space outside all of them.
 
     They may overlap one another, and reach through other walls.
 
@@ -148,14 +148,14 @@ class Capsules(ManyBodies):
     Args:
         centers: (n, 3) [m], one row a capsule.
         radii: (n,) or one number for all, above 0 [m].
-        lengths: of the straight parts, (n,) or one number for all, above 0 [m].
+        lengths: lengths of the straight parts, (n,) or one number for all, above 0 [m].
         axes: (n, 3) or three numbers for all, not all 0.
         side: "outside".
 
     Raises:
         SceneError: an argument is out of its range.
 
-    Cost: a grid of cells finds the next one.
+    Cost: a grid of cells finds the next capsule.
 
     >>> Capsules([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], 0.25, 0.5).phi([[0.25], [0.0], [0.2]])
     array([0.])
@@ -175,7 +175,7 @@ class Capsules(ManyBodies):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Boxes(ManyBodies):
-    """Many solid boxes, one surface; the space outside of all of them.
+    """Many solid boxes, one surface; the space outside all of them.
 
     They may overlap one another, and reach through other walls.
 
@@ -192,7 +192,7 @@ class Boxes(ManyBodies):
     Raises:
         SceneError: an argument is out of its range.
 
-    Cost: a grid of cells finds the next one.
+    Cost: a grid of cells finds the next box.
 
     >>> Boxes([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], (0.25, 0.25, 0.25)).phi([[0.25, 0.5], [0.0, 0.0], [0.0, 0.0]])
     array([0.  , 0.25])
@@ -213,7 +213,7 @@ class Boxes(ManyBodies):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Ellipsoids(ManyBodies):
-    """Many solid ellipsoids, one surface; the space outside of all of them.
+    """Many solid ellipsoids, one surface; the space outside all of them.
 
     They may overlap one another, and reach through other walls.
 
@@ -230,7 +230,7 @@ class Ellipsoids(ManyBodies):
     Raises:
         SceneError: an argument is out of its range.
 
-    Cost: a grid of cells finds the next one.
+    Cost: a grid of cells finds the next ellipsoid.
 
     >>> Ellipsoids([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], (0.25, 0.25, 0.5)).phi([[0.25, 1.0], [0.0, 0.0], [0.0, 0.5]])
     array([0., 0.])

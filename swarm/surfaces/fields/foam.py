@@ -1,4 +1,4 @@
-"""Many cavities as one vessel: a foam, or pores. A particle is in any of them, and its flight leaves the last."""
+"""Many cavities as one vessel: a foam, or pores. A particle is in any of them, and its flight leaves the last one."""
 
 import math
 
@@ -12,18 +12,18 @@ from ..presence.patched import Patched
 from ..time_of_impact import flights
 from .members import Members, SignedDistance, member, nearest_body
 
-# By so many times round-off is a flight inside of another cavity where it goes on.
+# A flight that continues in another cavity is inside it by this multiple of round-off.
 _INSIDE = 4.0
-# So many parts of a flight are looked at before it is said to be free so far.
+# The most parts of a flight that are followed before it is reported as free up to there.
 _MOST_PARTS = 1000
 
 
 class Foam(Members, Patched):
-    """Cavities, in any of which is admissible; the wall of each is there where it is in no other."""
+    """Cavities; a place in any of them is admissible; the wall of each is present where it is in no other."""
 
     @outlined
     def field_hit(self, gravity, r, v):
-        """When a flight leaves the last of the cavities that hold it, or its cell, or goes on in another cavity."""
+        """Return when a flight leaves the last of the cavities that hold it, or its cell, or enters another cavity."""
         first, stop = entries_at(self.grid, r)
         nearest, slack = _nearest(self, r), ON_FOAM * total(absolute(r))
         last, wall = -1.0, -1.0
@@ -42,25 +42,25 @@ class Foam(Members, Patched):
         return flights.Hit(last, wall)
 
     def other_hit(self, number, r, v, until):
-        # A chord of a cavity is inside of it.
+        # A chord of a cavity is inside the cavity.
         return flights.NEVER if number >= 0.0 else _end(self, r, v, until)
 
     def is_in_another(self, number, r):
         return _nearest(self, r)[1] > 0.0
 
     def deepest_in_cell(self, r):
-        """The distance outside of the nearest one."""
+        """Return the distance outside the nearest cavity."""
         return _nearest(self, r)[1]
 
     @outlined
     def foot(self, tree, r):
-        """The `SignedDistance` outside of the nearest cavity, which may be one of another cell."""
+        """Return the `SignedDistance` outside the nearest cavity, which may be one of another cell."""
         gap, which = nearest_body(self, r)
         if not gap < math.inf:
             return SignedDistance(-math.inf, Vec(1.0, 0.0, 0.0))
         return SignedDistance(gap, member(self, index(which - 1)).gradient(r))
 
-    # What is near a point is the wall of the cavity that it is deepest in.
+    # The wall near a point is that of the cavity in which the point is deepest.
 
     def count_in_cell(self, r):
         return 1 - int(self.is_gone())
@@ -80,7 +80,7 @@ class Foam(Members, Patched):
 
 @outlined
 def _nearest(foam, r):
-    """The cavity that a point is deepest in, or nearest to, of those of its cell, and the distance outside of it."""
+    """Return the cavity of the cell in which a point is deepest, or that is nearest, and the distance outside it."""
     if foam.is_gone():
         return 0.0, -math.inf
     first, stop = entries_at(foam.grid, r)
@@ -95,7 +95,7 @@ def _nearest(foam, r):
 
 @outlined
 def _is_in_other(foam, number, r, near):
-    """Whether a point is inside of another cavity than this one, by more than `near`."""
+    """Whether a point is inside a cavity other than `number`, by more than `near`."""
     first, stop = entries_at(foam.grid, r)
     for k in range(first, stop):
         m = foam.grid.entries[k]
@@ -106,7 +106,7 @@ def _is_in_other(foam, number, r, near):
 
 @outlined
 def _end(foam, r, v, until):
-    """The `Hit` where a straight flight that lasts so long leaves the foam; the wall is -1 where it is free so far."""
+    """Return the `Hit` where a straight flight leaves the foam; the wall is -1 if it is free until `until`."""
     t = 0.0
     for _part in range(_MOST_PARTS):
         hit = foam.field_hit(None, r + t * v, v)

@@ -1,4 +1,4 @@
-"""The grid of many bodies: how wide its cells are, and which bodies reach into each."""
+"""The grid of many bodies: the width of its cells, and the bodies that reach into each."""
 
 from functools import partial
 from typing import Any
@@ -14,16 +14,16 @@ from ...kernel.vector import Vec
 from ...state import Floats
 from .members import gathered
 
-# Cells for each body: a flight through more of them looks at fewer bodies in each.
+# Cells for each body: a flight through more cells tests fewer bodies in each.
 _CELLS_EACH = 1.0
-# The least extent along an axis, of the largest.
+# The least extent along an axis, as a part of the largest.
 _FLAT = 1e-3
-# So many bodies are entered in plain Python: to compile what does it takes a second.
+# Up to this number of bodies are entered in plain Python: compiling the kernel takes a second.
 _SOME = 2000
 
 
 def cells_of(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) -> tuple[Floats, Floats, Floats]:
-    """The corner of the grid, how many cells it has along each axis, and how wide they are."""
+    """Return the corner of the grid, the number of its cells along each axis, and their widths."""
     first, last, bodies = low.min(axis=1), high.max(axis=1), low.shape[1]
     if repeated is not None:
         first, last = np.maximum(first, repeated[0]), np.minimum(last, repeated[1])
@@ -33,7 +33,7 @@ def cells_of(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) 
         )
     endless = ~((first > -0.5 * ENDLESS) & (last < 0.5 * ENDLESS))
     extent = np.where(endless, 1.0, last - first)
-    # Flat bodies in one plane have room before and behind it.
+    # Flat bodies in one plane have cells before and behind them.
     extent = np.where(endless, 1.0, np.maximum(extent, _FLAT * np.where(endless, 0.0, extent).max()))
     each = extent[~endless].prod() / (_CELLS_EACH * max(1, bodies))
     side = each ** (1.0 / max(1, (~endless).sum()))
@@ -43,7 +43,7 @@ def cells_of(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) 
         last = np.where(repeated[1] - last < side, repeated[1], last)
         extent = np.where(endless, 1.0, last - first)
     shape = np.where(endless, 1.0, np.maximum(np.rint(extent / max(side, TINY)), 1.0))
-    # A little wider than the bodies, so that a flight from outside comes in before it meets one.
+    # A little wider than the bodies, so that a flight from outside enters the grid before it meets one.
     room = 4.0 * MARGIN * extent
     before = behind = room
     if repeated is not None:
@@ -55,13 +55,13 @@ def cells_of(low: Floats, high: Floats, repeated: tuple[Floats, Floats] | None) 
 def grid_of(
     like: Any, table: Floats, bounds: tuple[Floats, Floats], repeated: tuple[Floats, Floats] | None = None
 ) -> Grid:
-    """The grid of the bodies of a table.
+    """Return the grid of the bodies of a table.
 
     Args:
-        like: the numbers of one of them.
-        table: those of all, one in each row.
-        bounds: lowest and highest corner of each body (3, n), infinite where it has no end [m].
-        repeated: the corners (3,) of the cell of the scene that repeats, infinite where it does not; None: none does.
+        like: the numbers of one body.
+        table: the numbers of all bodies, one body in each row.
+        bounds: lowest and highest corner of each body (3, n), infinite along an axis on which it has no end [m].
+        repeated: the corners (3,) of the periodic cell of the scene, infinite along axes without a period, or None.
     """
     enter = cache.in_python(enter_bodies) if len(table) <= _SOME else enter_bodies
     return filled_grid(*cells_of(*bounds, repeated), partial(enter, like, table, bounds))
@@ -69,7 +69,7 @@ def grid_of(
 
 @kernel
 def enter_bodies(like, table, bounds, grid, place, entries):
-    """Write every body to the place of each cell that it reaches into; count them where there are no `entries`."""
+    """Write every body to the place of each cell that it reaches into; count the bodies if there are no `entries`."""
     low, high = bounds
     n, margin = grid.shape, Vec(2.0 * grid.margin.x, 2.0 * grid.margin.y, 2.0 * grid.margin.z)
     for m in range(table.shape[0]):
@@ -90,5 +90,5 @@ def enter_bodies(like, table, bounds, grid, place, entries):
 
 
 def _layers(begin, end, width, count):
-    """The layers of cells between two places, from the first to the one after the last."""
+    """Return the layers of cells between two places, from the first to the one after the last."""
     return int(layer_of(begin / width, count)), int(layer_of(end / width, count)) + 1

@@ -1,4 +1,4 @@
-"""Which surfaces of a scene kernels take together: more than a few of one kind are one field."""
+"""Surfaces of a scene that kernels take together: more than a few of one kind are one field."""
 
 import functools
 from collections import defaultdict
@@ -12,8 +12,8 @@ from ..surface import LAWS, Surface
 from .many import Many
 from .members import alike, can_be_member, kind_of
 
-# So many surfaces of one kind stay separate walls; their numbers are not looked up: an impact in a sphere with 6
-# balls takes 24 ns, and 31 as a field of a few. From 8 on LLVM no longer vectorises them: 112 and 38 ns.
+# Up to this number of surfaces of one kind stay separate walls; their numbers are not looked up: an impact in a sphere
+# with 6 balls takes 24 ns, and 31 as a field of a few. From 8 on LLVM no longer vectorises them: 112 and 38 ns.
 _FEW = 6
 
 # The surfaces that are fields.
@@ -26,26 +26,26 @@ Thing = TypeVar("Thing")
 
 
 def by_kind(things: Iterable[Thing], numbers: Callable[[Thing], Any]) -> list[Thing]:
-    """Things in the order of the types of their numbers; those of the same types stay in their order.
+    """Return things in the order of the types of their numbers; things of the same types stay in their order.
 
-    Kernels are compiled for these types: one order stands for all in which a user may list the same.
+    Kernels are compiled for these types: one order serves for all orders in which a user may list the same things.
     """
     listed = list(things)
-    # The numbers of one thing alone may take long.
+    # Computing the numbers of one thing may take long.
     return sorted(listed, key=lambda thing: _rank(numbers(thing))) if len(listed) > 1 else listed
 
 
 def _rank(numbers: Any) -> tuple[int, str]:
-    # What is known by most numbers comes first, so planes last. Any order would do, but of two walls that are met at
-    # the same instant the first is met first.
+    # Surfaces with the most numbers come first, so planes last. Any order would do, but of two walls that are met at
+    # the same instant the first in the order is met first.
     text = _text(numbers)
     return -len(text), text
 
 
 def _text(numbers: Any) -> str:
-    """The types of nested numbers."""
+    """Return the types of nested numbers."""
     if type(numbers) is tuple:
-        # As nested pairs: by their text walls have the order in which results of earlier versions were made.
+        # As nested pairs: their text gives walls the order in which results of earlier versions were made.
         return functools.reduce(lambda rest, part: f"Chain({_text(part)},{rest})", reversed(numbers), "NoneType")
     parts = f"({','.join(map(_text, numbers))})" if isinstance(numbers, (tuple, list)) else ""
     return type(numbers).__name__ + parts
@@ -60,22 +60,22 @@ class Order(NamedTuple):
     fields: tuple[int, ...]  # each many bodies
     groups: tuple[tuple[int, ...], ...]  # each taken as one field
     others: tuple[int, ...]
-    # Of each union its rooms, of each room its surfaces, of which the walls come last.
+    # For each union its rooms, for each room its surfaces; their walls come last.
     unions: tuple[tuple[tuple[int, ...], ...], ...] = ()
     of_balls: bool = False
 
     def joined(self) -> tuple[int, ...]:
-        """The surfaces of unions of several rooms."""
+        """Return the surfaces of unions of several rooms."""
         return tuple(i for rooms in self.unions for room in rooms for i in room)
 
     def alone(self) -> tuple[int, ...]:
-        """The surfaces of which each wall is one of the scene, in the order of these."""
+        """Return the surfaces that have walls of their own, in the order of these walls."""
         return *self.others, *self.joined()
 
     def rows(self, surfaces: Sequence[Surface], together: bool = False) -> list[tuple[int, int]]:
-        """Of each row of the scene its surface, and the number of its walls: the members of a field, else one.
+        """Return for each row of the scene its surface, and the number of its walls: the members of a field, else one.
 
-        With groups `together` it is walls in a row that have the same laws: a group counts as its first surface.
+        With groups `together` return runs of walls with the same laws: a group counts as its first surface.
         """
         fields = [(i, surfaces[i].wall_count(self.of_balls)) for i in self.fields]
         groups = [(group[0], len(group)) for group in self.groups]
@@ -90,9 +90,9 @@ def order_of(
     unions: Sequence[tuple[tuple[int, ...], ...]] = (),
     of_balls: bool = False,
 ) -> Order:
-    """The order of the walls of a scene; where a surface moves, or not `together`, all are walls of their own.
+    """Return the order of the walls of a scene; if a surface moves, or not `together`, all are walls of their own.
 
-    `unions` are those of surfaces, as of `Order`; the walls are those of points, or `of_balls`.
+    `unions` is as in `Order`; the walls are those for points, or `of_balls`.
     """
     joined = {i for rooms in unions for room in rooms for i in room}
     fields = [i for i, surface in enumerate(surfaces) if isinstance(surface, _FIELDS) and not surface.is_one_wall]
@@ -114,7 +114,7 @@ def order_of(
 
     def walls(i: int) -> Any:
         one = surfaces[i]
-        # What is only looked at where it stays has no motion that kernels know.
+        # A surface that is only considered at rest has no motion that kernels know.
         return one.walls() if isinstance(one.motion, Placed) else walls_of(one, 0.0), one.motion, one.mass, one.inertia
 
     def volumes(i: int) -> Any:
@@ -123,7 +123,7 @@ def order_of(
     def body(group: tuple[int, ...]) -> Any:
         return alike([surfaces[i].walls()[0] for i in group])[0]
 
-    # Fields of few bodies may be of a kind of their own. Openings are last: which walls have them is no kind.
+    # Fields of few bodies may be of a kind of their own. Openings are last: the kind does not depend on them.
     fields.sort(key=lambda i: len(surfaces[i]))  # type: ignore[arg-type]
     groups.sort(key=len)
     fields, others = (by_kind(by_kind(some, volumes), walls) for some in (fields, others))

@@ -1,4 +1,4 @@
-"""Many bodies of one kind as one surface: what their descriptions have in common."""
+"""Many bodies of one kind as one surface: the common part of their descriptions."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, fields, replace
@@ -24,12 +24,12 @@ from .grid import grid_of
 from .members import Few, GrownLike, Members, alike, nearest, table_of, touched, within
 from .one_wall import OneWall, one_wall
 
-# So many bodies are looked at one after the other by all lanes together, where flights are straight: in a sphere an
-# impact among 10, 24 and 40 balls takes 18, 37 and 57 ns, from cell to cell 55, 73 and 91. Of other bodies, which take
-# longer, fewer; and in a cell that repeats, as its faces end flights too: among 27 balls 87 ns, from cell to cell 52.
-# Under gravity cells are faster from 16 on: so few are in one cell.
+# Up to these numbers of bodies all lanes test every body, if flights are straight: in a sphere an impact among 10, 24
+# and 40 balls takes 18, 37 and 57 ns, from cell to cell 55, 73 and 91. For other bodies, which take longer, fewer; and
+# in a periodic cell, as its faces end flights too: among 27 balls 87 ns, from cell to cell 52.
+# Under gravity cells are faster from 16 on: up to this number are in one cell.
 _FEW, _FEW_BALLS, _IN_ONE_CELL = 24, 48, 16
-# The quaternion that turns nothing.
+# The quaternion of the identity.
 _UNTURNED = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -65,18 +65,18 @@ class Many(Surface):
 
     @property
     def members(self) -> Members:
-        """The walls as kernels take them."""
+        """Return the walls as a record for kernels."""
         raise NotImplementedError
 
     def _members_of_balls(self, largest: float) -> Members:
         raise NotImplementedError
 
     def corners(self) -> tuple[Floats, Floats]:
-        """The bounds of every body, its lowest and its highest corner (3, n), infinite where it has no end."""
+        """Return the bounds of every body, its lowest and its highest corner (3, n), infinite along an endless axis."""
         raise NotImplementedError
 
     def numbers(self) -> list[int]:
-        """The number of every body, or side."""
+        """Return the number of every body, or side."""
         return list(range(len(self)))
 
     def wall_count(self, of_balls: bool) -> int:
@@ -90,7 +90,7 @@ class Many(Surface):
 
     def walls_of_balls(self, largest: float) -> tuple[Members]:
         made: dict[float, Members] = self.__dict__.setdefault("_of_balls", {})
-        # The cells of larger balls are as right.
+        # The cells of larger balls serve as well.
         largest = min((one for one in made if one >= largest), default=largest)
         if largest not in made:
             made[largest] = self._members_of_balls(largest)
@@ -98,16 +98,16 @@ class Many(Surface):
 
 
 class ManyBodies(Many):
-    """Solid bodies of one kind; particles live outside of all of them. They may overlap."""
+    """Solid bodies of one kind; particles live outside all of them. They may overlap."""
 
     centers: Any
-    # Of one body
+    # The class of one body
     kind: ClassVar[type[Surface]]
-    # The corners of the cell that repeats, in a scene in which one does.
+    # The corners of the periodic cell, in a periodic scene.
     repeated: ClassVar[tuple[Floats, Floats] | None] = None
     # Whether they may be cavities, in any of which particles live.
     may_be_foam: ClassVar[bool] = False
-    # Of images, the bodies that they are of.
+    # For images, the numbers of their bodies.
     which: ClassVar[NDArray[np.int64] | None] = None
 
     def __post_init__(self) -> None:
@@ -146,18 +146,18 @@ class ManyBodies(Many):
         return len(self.centers)
 
     def __repr__(self) -> str:
-        """Their kind and number, and the laws of their wall."""
+        """Return their kind and number, and the laws of their wall."""
         return self._call([f"<{len(self)}>"], [one for one in fields(self) if one.kw_only])
 
     @classmethod
     def columns(cls) -> dict[str, tuple[str, ...]]:
-        """The columns of a file that hold each argument of the bodies."""
+        """Return the columns of a file that hold each argument of the bodies."""
         known = {field.name for field in fields(cls)}
         return {argument: rows.columns for argument, rows in _ROWS.items() if argument in known}
 
     @classmethod
     def needed(cls) -> list[str]:
-        """The arguments that have no default."""
+        """Return the arguments that have no default."""
         return [field.name for field in fields(cls) if field.default is MISSING]
 
     # --- For kernels -------------------------------------------------------------------------------------
@@ -187,7 +187,7 @@ class ManyBodies(Many):
     def images(
         self, which: NDArray[np.int64], centers: Floats, repeated: tuple[Floats, Floats] | None = None
     ) -> "ManyBodies":
-        """A field of these bodies, at other places, for a cell with these corners that repeats."""
+        """Return a field of the bodies `which`, at other places, for a periodic cell with these corners."""
         given = {field.name: getattr(self, field.name) for field in fields(self)}
         taken: dict[str, Any] = {name: value[which] for name, value in given.items() if isinstance(value, np.ndarray)}
         made = replace(self, **{**taken, "centers": centers})
@@ -196,7 +196,7 @@ class ManyBodies(Many):
         return made
 
     def with_bodies(self, bodies: dict[int, Surface]) -> "ManyBodies":
-        """The field with other places and sizes of the bodies in some rows."""
+        """Return the field with other places and sizes of the bodies in some rows."""
         made = {
             name: getattr(self, name).copy() for name in ("centers", *_SIZES) if getattr(self, name, None) is not None
         }
@@ -206,7 +206,7 @@ class ManyBodies(Many):
         return replace(self, **made)
 
     def numbers(self) -> list[int]:
-        """The number of every body; of an image that of the body it is of."""
+        """Return the number of every body; for an image the number of its body."""
         return super().numbers() if self.which is None else self.which.tolist()
 
     @cached_property
@@ -228,7 +228,7 @@ class ManyBodies(Many):
         return self.solids()[0].why_no_balls()
 
     def contain(self, points: Floats) -> NDArray[np.bool_]:
-        """Whether each of the points (3, N) is in a body: cheaper than phi, which asks for the nearest one."""
+        """Whether each of the points (3, N) is in a body: cheaper than phi, which needs the nearest body."""
         found = np.empty(points.shape[1], np.bool_)
         with np.errstate(all="ignore"):
             within(self.members, np.ascontiguousarray(points), found)
@@ -257,7 +257,7 @@ class ManyBodies(Many):
         return max(solid.extent() for solid in self.solids())
 
     def phi(self, points: ArrayLike, time: float = 0.0) -> NDArray[np.float64]:
-        """phi of the nearest body at points (3, N): below 0 in it, above 0 outside of all; shape (N,)."""
+        """Return phi of the nearest body at points (3, N): below 0 in it, above 0 outside all; shape (N,)."""
         return np.asarray(self._of_nearest(points, time)[3])
 
     def _own_gradient(self, points: ArrayLike, time: float) -> NDArray[np.float64]:
@@ -273,16 +273,16 @@ class ManyBodies(Many):
 
 
 def sign_of(volume: Surface) -> float:
-    """The sign of phi out of a volume, which of many bodies is the inside of each."""
+    """The sign of phi outside a volume; the volume of many bodies is the inside of each."""
     return 1.0 if isinstance(volume, Many) else side_of(volume)
 
 
 def members_of(
     surfaces: Sequence[Surface], repeated: tuple[Floats, Floats] | None, largest: float | None = None
 ) -> Members:
-    """Solid surfaces of one kind as one field; in a scene with a cell that repeats, with the corners of that.
+    """Return solid surfaces of one kind as one field; in a periodic scene with the corners of its cell.
 
-    Of points, or of balls with radii of the `largest` at most [m].
+    The field is for points, or for balls with radii up to `largest` [m].
     """
     if largest is None:
         bodies = alike([surface.walls()[0] for surface in surfaces])
@@ -295,19 +295,19 @@ def field_of(
     like: Any, table: Floats, corners: Callable[[], tuple[Floats, Floats]], repeated: tuple[Floats, Floats] | None,
     largest: float | None = None,
 ) -> Members:  # fmt: skip
-    """The field of the bodies of a table, with their bounds."""
+    """Return the field of the bodies of a table, with their bounds."""
     if len(table) <= _IN_ONE_CELL:
         return Members(like, table, one_cell(len(table)))
     if largest is None:
         return Members(like, table, grid_of(like, table, corners(), repeated))
     low, high = corners()
-    # In the cells that a ball's centre is in where it touches them
+    # In the cells of the centres of balls that touch them
     grown = GrownLike(like, largest)
     return Members(like, table, grid_of(grown, table, (low - largest, high + largest), repeated))
 
 
 def in_straight_flights(members: Members, repeats: bool) -> Members:
-    """A field as kernels take it where there is no gravity, and nothing moves; in a cell that repeats, or not."""
+    """Return the best kind of field for flights without gravity and motion, in a periodic scene or not."""
     if isinstance(members, Patched):
         return members
     few = _FEW_BALLS if isinstance(members.like, SphereNumbers) and not repeats else _FEW
@@ -315,6 +315,6 @@ def in_straight_flights(members: Members, repeats: bool) -> Members:
 
 
 def _corners_of(surfaces: Sequence[Surface]) -> tuple[Floats, Floats]:
-    """The lowest and the highest corners of solids (3, n): those of their cavities."""
+    """Return the lowest and the highest corners of solids (3, n), which are those of their cavities."""
     boxes = np.array([surface.enclosing_box() for surface in surfaces])
     return np.ascontiguousarray(boxes[:, 0].T), np.ascontiguousarray(boxes[:, 1].T)

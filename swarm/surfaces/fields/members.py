@@ -1,4 +1,4 @@
-"""Many bodies of one kind as kernels take them: their numbers in one table, and the grid that finds the next one."""
+"""Many bodies of one kind in kernels: their numbers in one table, and the grid that finds the next one."""
 
 import math
 from collections.abc import Sequence
@@ -22,11 +22,11 @@ from ..shapes.sphere import SphereCavity, SphereNumbers, ball, cavity
 from ..time_of_impact import flights
 from ..time_of_impact.course import rise_time
 
-# So many cells a step is followed through at most.
+# The most cells through which a step is followed.
 _MOST_CELLS = 4000
-# The rows of a rotation that turns nothing.
+# The rows of the identity.
 _UNTURNED = Vec(1.0, 0.0, 0.0), Vec(0.0, 1.0, 0.0), Vec(0.0, 0.0, 1.0)
-# What has fields of its own in a table, beside vectors and balls.
+# The kinds with fields of their own in a table, besides vectors and balls.
 _KINDS: tuple[Any, ...] = (CapsuleNumbers, QuadricNumbers, SlabNumbers, *AXES, Rotated, SolidNumbers)
 
 
@@ -38,7 +38,7 @@ class GrownLike(Record):
 
     @property
     def lacks_bend(self):
-        """Whether they cannot move other than uniformly."""
+        """Whether the bodies support uniform motion only."""
         return self.body.lacks_bend
 
 
@@ -50,66 +50,66 @@ class SignedDistance(Record):
 
 
 class Members(Record):
-    """The bodies of a field: solids, outside of all of which is admissible."""
+    """The bodies of a field: solids; a place outside all of them is admissible."""
 
-    like: Any  # the numbers of one of them, which say of what kind they are
-    table: Array  # (members, width) the numbers of each
+    like: Any  # the numbers of one body, which determine the kind
+    table: Array  # (members, width) the numbers of each body
     grid: Grid
 
-    # What a wall at rest says, as in contract.py.
+    # As for a wall at rest, see contract.py.
     flat = accelerates = False
 
     @property
     def lacks_bend(self):
-        """Whether they cannot move other than uniformly."""
+        """Whether the bodies support uniform motion only."""
         return self.like.lacks_bend
 
     @property
     def holds_balls(self):
-        """Whether balls may meet them: a constant for the compiler."""
+        """Whether balls may meet the bodies: a constant for the compiler."""
         return self.like.holds_balls
 
     def grown(self, radius):
-        """The field that the centre of a ball meets."""
+        """Return the field that the centre of a ball meets."""
         return self._replace(like=GrownLike(self.like, radius))
 
     def time_scale(self):
-        """A time in which their motion changes little [s]."""
+        """A time in which the motion of the field changes little [s]."""
         return math.inf
 
-    # Whether each lane looks at all of them on a straight flight.
+    # Whether each lane tests all bodies on a straight flight.
     few = False
-    # Whether it is known how many cells around an empty one are empty.
+    # Whether the number of empty cells around an empty cell is stored.
     in_blocks = False
 
     def in_cells(self):
-        """The field of bodies that a flight meets in the cells that it passes, and nowhere else."""
+        """Return the field of bodies that a flight meets in the cells that it passes, and nowhere else."""
         return self
 
     def gone(self):
-        """The field while none of the bodies is there: no cell has any, nor does the grid."""
+        """Return the field while all bodies are absent: neither its cells nor its grid have entries."""
         grid = self.in_cells().grid
         return self.in_cells()._replace(grid=grid._replace(first=np.zeros_like(grid.first), entries=grid.entries[:0]))
 
     def is_gone(self):
-        """Whether none of the bodies is there."""
+        """Whether all bodies are absent."""
         return self.grid.entries.shape[0] == 0
 
     def as_met(self):
-        """`like` of one that is met: what only says where it is met is left out."""
+        """Return `like` for a body that is met: without the data that only determine where it is met."""
         return self.like
 
     def count(self):
-        """Their number."""
+        """Return the number of bodies."""
         return float(self.table.shape[0])
 
     def wall(self, number):
-        """One of them, as a surface; of a number that none has the first or the last."""
+        """Return one body as a surface; for a number out of range the first or the last body."""
         last = self.table.shape[0] - 1.0
         return member(self, index(int(select(number < 0.0, 0.0, select(number > last, last, number)))))
 
     def far(self, r):
-        """A lower bound of the distance of a place from all of them: that from the end of a cell with none."""
+        """Lower bound of the distance of a place from all bodies: the distance from the end of an empty cell."""
         cell = cell_of(self.grid, r)
         first, stop = entries_of(self.grid, cell.number)
         if not cell.inside or first < stop:
@@ -117,12 +117,12 @@ class Members(Record):
         return _until_side(self, cell, r)
 
     def reach(self, lease):
-        """A time during which a particle surely meets none of them, as `Smooth.reach`."""
+        """A time during which a particle surely meets no body, as `Smooth.reach`."""
         return rise_time(-self.far(lease.r), 0.5 * (norm(lease.v) + lease.width), 0.5 * norm(lease.a))
 
     @outlined
     def is_in_another(self, number, r):
-        """Whether a point is in any but the one with this number."""
+        """Whether a point is in any body except `number`."""
         first, stop = entries_at(self.grid, r)
         for k in range(first, stop):
             m = self.grid.entries[k]
@@ -133,7 +133,7 @@ class Members(Record):
 
     @outlined
     def field_hit(self, gravity, r, v):
-        """The first `Hit` of a free flight in its cell, or when it leaves that, free so far."""
+        """Return the first `Hit` of a free flight in its cell, or when it leaves the cell, free until then."""
         grid = self.grid
         cell = cell_of(grid, r)
         found, (first, stop) = flights.Hit(until_next(gravity, grid, cell, r, v), -1.0), entries_of(grid, cell.number)
@@ -146,7 +146,7 @@ class Members(Record):
 
     @outlined
     def other_hit(self, number, r, v, until):
-        """The first `Hit` of a straight flight that lasts so long with any but this one; -1: with any of them."""
+        """Return the first `Hit` of a straight flight up to `until` with any body except `number`; -1: any body."""
         grid, t, place = self.grid, 0.0, r
         for _cell in range(_MOST_CELLS):
             cell = cell_of(grid, place)
@@ -163,57 +163,57 @@ class Members(Record):
         return flights.Hit(t, -1.0)
 
     def keeps(self, number, r):
-        """Whether a step along one of them that ends at a place on it ends where that is; of any other it says so."""
+        """Whether a step along body `number` that ends at a place on it ends where it is present; else True."""
         return True
 
-    # --- Of a field that moves: see safe.py ---
+    # --- For a field that moves: see safe.py ---
 
     def loosened(self, reach):
-        """The field where places in its frame have round-off of so much more than its own size [m]."""
+        """Return the field for places in its frame with a round-off that is larger by that of `reach` [m]."""
         return self
 
     def until_out(self, cell, gravity, r, v):
-        """When a flight is beyond a cell, or the free cells around it; of its acceleration there may be bounds."""
+        """Return when a flight is beyond a cell, or the free cells around it; its acceleration may have bounds."""
         return until_next(gravity, self.grid, cell, r, v)
 
     def way_in_cell(self, cell, seen, span):
-        """What `may_meet` asks of a flight that is so long in a cell [s]."""
+        """Return the argument of `may_meet` for a flight in a cell during `span` [s]."""
         return
 
     def misses(self, m, seen, longest):
-        """Whether a flight, seen in the frame of the field, surely misses one of its bodies for so long."""
+        """Whether a flight, seen in the frame of the field, surely misses body `m` until `longest`."""
         return False
 
     def may_meet(self, cell, k, here):
-        """Whether that flight may meet the body of an entry of the cell."""
+        """Whether this flight may meet the body of an entry of the cell."""
         return True
 
-    # --- Of those in the cell of a point ---
+    # --- The bodies in the cell of a point ---
 
     def count_in_cell(self, r):
-        """Their number."""
+        """Return the number of bodies in the cell of a point."""
         first, stop = entries_at(self.grid, r)
         return int(stop - first)
 
     def list_in_cell(self, k, before, r, into):
-        """Their numbers, with so many walls before them, into into[k:], and how many they are."""
+        """Write their numbers, counted from `before`, into into[k:]; return how many were written."""
         first, stop = entries_at(self.grid, r)
         for i in range(first, stop):
             into[k + i - first] = before + self.grid.entries[i]
         return int(stop - first)
 
     def one_in_cell(self, k, r):
-        """The number of one of them."""
+        """Return the number of entry k of the cell."""
         first, _stop = entries_at(self.grid, r)
         return self.grid.entries[first + k]
 
     def until_next_cell(self, r, v):
-        """When a straight flight may meet another one."""
+        """Return when a straight flight may meet a body of another cell."""
         return until_next(None, self.grid, cell_of(self.grid, r), r, v)
 
     @outlined
     def deepest_in_cell(self, r):
-        """The largest distance into any of them."""
+        """Return the largest distance into any body of the cell."""
         most = -math.inf
         first, stop = entries_at(self.grid, r)
         for k in range(first, stop):
@@ -222,7 +222,7 @@ class Members(Record):
 
     @outlined
     def foot(self, tree, r):
-        """The `SignedDistance` of a point on all of them as one wall; `tree` is that of a mesh.
+        """Return the `SignedDistance` of a point for all bodies as one wall; `tree` is that of a mesh.
 
         The gap of a point in several bodies is the root of the sum of the squares of its depths.
         """
@@ -243,7 +243,7 @@ class Members(Record):
 
 
 class Few(Members):
-    """So few bodies that each lane looks at all of them on a straight flight, faster than from cell to cell."""
+    """Few bodies, all of which each lane tests on a straight flight, faster than from cell to cell."""
 
     few = True
 
@@ -252,32 +252,32 @@ class Few(Members):
 
 
 def _until_side(members, cell, r):
-    """The distance of a place from the nearest face of its cell, or of the block of free cells around it."""
+    """Return the distance of a place from the nearest face of its cell, or of the block of free cells around it."""
     ahead, back = (members.until_out(cell, None, r, Vec(way, way, way)) for way in (1.0, -1.0))
     return min(ahead, back)
 
 
 def member(members, m):
-    """The numbers of one body."""
+    """Return the numbers of one body."""
     return gathered(members.like, members.table, m, 0)
 
 
 def gathered(like, table, m, k):
-    """Numbers of one kind with `like`, from row m of a table, from column k on."""
+    """Return numbers of the kind of `like`, from row m of a table, from column k on."""
     numbers, _after = _taken(like, table, m, k)
     return numbers
 
 
 def _taken(like, table, m, k):
-    """What `gathered` gives, and the column after its last one."""
-    # Numbers first: plain Python asks in this order.
+    """Return the result of `gathered`, and the column after its last one."""
+    # Numbers first: plain Python tests in this order.
     if not isinstance(like, tuple):
         return (None, k) if like is None else (table[m, k], k + 1)
     if isinstance(like, GrownLike):
         body, k = _taken(like.body, table, m, k)
         return body.grown(like.radius), k
     if isinstance(like, SphereNumbers):
-        # Four numbers of it are half a line of the cache; the others follow from them.
+        # Four of its numbers are half a line of the cache; the others follow from them.
         made = cavity if isinstance(like, SphereCavity) else ball
         return made(Vec(table[m, k], table[m, k + 1], table[m, k + 2]), table[m, k + 3]), k + 4
     if isinstance(like, Shared):
@@ -294,7 +294,7 @@ def _taken(like, table, m, k):
 
 
 def width(like):
-    """The number of columns: a constant for the compiler."""
+    """Return the number of columns: a constant for the compiler."""
     if not isinstance(like, tuple):
         return 0 if like is None else 1
     if isinstance(like, GrownLike):
@@ -305,12 +305,12 @@ def width(like):
 
 
 def table_of(bodies: Sequence[Any]) -> NDArray[np.float64]:
-    """The table of bodies, each the numbers of a wall, all of one kind."""
+    """Return the table of bodies, each the numbers of a wall, all of one kind."""
     return aligned_copy(np.array([_written(body) for body in bodies]))
 
 
 def can_be_member(wall: Any) -> bool:
-    """Whether a field may be of bodies with such numbers."""
+    """Whether a body with these numbers can be in a field."""
     if isinstance(wall, (float, type(None))):
         return True
     if isinstance(wall, (SphereNumbers, Vec)):
@@ -319,7 +319,7 @@ def can_be_member(wall: Any) -> bool:
 
 
 def kind_of(wall: Any) -> Any:
-    """The types of numbers that one field may hold, whatever their axes are."""
+    """Return the types of numbers that one field may hold, for any axes."""
     wall = wall.body if isinstance(wall, Rotated) else wall
     if isinstance(wall, (Vec, *AXES)):
         return Vec
@@ -327,7 +327,7 @@ def kind_of(wall: Any) -> Any:
 
 
 def alike(walls: Sequence[Any]) -> list[Any]:
-    """The numbers of bodies of one kind, of one type also where some of them are turned and others are not."""
+    """Return the numbers of bodies of one kind, of one type also if only some of them are turned."""
     if len({_type_of(wall) for wall in walls}) == 1:
         return list(walls)
     turned = any(isinstance(wall, Rotated) for wall in walls)
@@ -339,7 +339,7 @@ def _type_of(wall: Any) -> Any:
 
 
 def _in_general(wall: Any, turned: bool) -> Any:
-    """The same numbers, of the type that a body turned in any way has."""
+    """Return the same numbers, of the type of a body turned in any way."""
     if isinstance(wall, AXES):
         return Vec(*(float(isinstance(wall, axis)) for axis in AXES))
     if isinstance(wall, Rotated):
@@ -357,7 +357,7 @@ def _is_round(part: Any) -> bool:
 
 
 def _written(like: Any) -> list[float]:
-    """The columns of one body."""
+    """Return the columns of one body."""
     if like is None:
         return []
     if isinstance(like, SphereNumbers):
@@ -365,12 +365,12 @@ def _written(like: Any) -> list[float]:
     return [number for part in like for number in _written(part)] if isinstance(like, tuple) else [float(like)]
 
 
-# --- Which is near ---------------------------------------------------------------------------------------
+# --- The nearest bodies ----------------------------------------------------------------------------------
 
 
 @kernel
 def nearest(members, points, found):
-    """The gradient and phi, in the rows of `found`, of the body with the least phi near each of the points (3, N)."""
+    """Write the gradient and phi of the body with the least phi near each of the points (3, N) to rows of `found`."""
     for i in range(points.shape[1]):
         best, which = nearest_body(members, column(points, 0, i))
         put(found, 0, i, member(members, index(which - 1)).gradient(column(points, 0, i)))
@@ -379,7 +379,7 @@ def nearest(members, points, found):
 
 @outlined
 def nearest_body(members, r):
-    """The least phi of the bodies near a point, and the number of that body, from 1 on."""
+    """Return the least phi of the bodies near a point, and the number of this body, from 1 on."""
     grid = members.grid
     cells = max(grid.shape.x, max(grid.shape.y, grid.shape.z))
     place = cell_of(grid, r).place
@@ -387,7 +387,7 @@ def nearest_body(members, r):
     best, which, last, shell = math.inf, 0, cells, 0.0
     while shell <= last:
         phi, m = _least_in_shell(members, r, center, shell)
-        # What is one shell farther may be nearer still.
+        # A body in the next shell may be nearer still.
         if phi < math.inf and which == 0:
             last = min(last, shell + 1.0)
         if phi < best:
@@ -398,7 +398,7 @@ def nearest_body(members, r):
 
 @outlined
 def _least_in_shell(members, r, center, shell):
-    """The least phi in the cells that are `shell` cells away from one, and the number of its body."""
+    """Return the least phi in the cells that are `shell` cells away from one, and the number of its body."""
     grid, best, which = members.grid, math.inf, 0
     for x in _around(center.x, shell, grid.shape.x):
         for y in _around(center.y, shell, grid.shape.y):
@@ -420,7 +420,7 @@ def _around(place, shell, count):
 
 @kernel
 def within(members, points, found):
-    """Whether each of the points (3, N) is in any body, into `found`; on its surface it is not."""
+    """Write whether each of the points (3, N) is in any body into `found`; on its surface it is not."""
     grid = members.grid
     for i in range(points.shape[1]):
         r = column(points, 0, i)
@@ -432,6 +432,6 @@ def within(members, points, found):
 
 @kernel
 def touched(members, points, radius, found):
-    """How far balls at points (3, N) with their radii (N,) reach into any body, into `found`; -inf if none is near."""
+    """Write how far balls at points (3, N) with radii (N,) reach into any body into `found`; -inf if none is near."""
     for i in range(points.shape[1]):
         found[i] = members.grown(radius[i]).deepest_in_cell(column(points, 0, i))

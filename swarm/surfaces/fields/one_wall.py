@@ -1,8 +1,8 @@
-"""A field as one wall: the distance outside of all of it, of soft walls, into which points go.
+"""A field as one wall: the distance outside all of it, for soft walls, into which points go.
 
-A point may be in several bodies, or beyond several sides, at once; each is then a spring, as if it were a wall by
-itself. For the exponent 1 what they store together is that of one spring of the root of the sum of the squares. So the
-gap of the whole is that, and it goes on smoothly where one of them is left. Points outside of a mesh are at its nearest
+A point may be in several bodies, or beyond several sides, at once; each is then a spring, as a separate wall would be.
+For the exponent 1 their energy is that of one spring with the root of the sum of the squares. This root is the
+gap of the whole, and it is smooth where a point leaves one of them. Points outside a mesh are at its nearest
 place.
 """
 
@@ -21,9 +21,9 @@ from ..time_of_impact.rising import LevelStep
 
 _Field = TypeVar("_Field")
 
-# So many parts of a flight are looked at before it is said to be free so far.
+# The most parts of a flight that are followed before it is reported as free up to there.
 _MOST_PARTS = 1000
-# The cosine of the normals at both ends of a step, at an edge and where a wall is smooth.
+# The cosine between the normals at both ends of a step: below the first there is an edge, above the second none.
 _EDGE, _SMOOTH = 0.5, 0.9
 
 
@@ -31,7 +31,7 @@ class OneWall(Smooth):
     """All members of a field as one surface; phi is the gap, the signed distance outside."""
 
     members: Any
-    tree: Any  # of a mesh, how the nearest triangle is found; else None
+    tree: Any  # for a mesh the data that find the nearest triangle; else None
 
     side = 1.0
 
@@ -42,7 +42,7 @@ class OneWall(Smooth):
         return _foot(self, r).normal
 
     def distance(self, r):
-        # Of bodies phi need not be the distance.
+        # For bodies phi need not be the distance.
         foot = _foot(self, r)
         return foot.gap / norm(foot.normal)
 
@@ -51,7 +51,7 @@ class OneWall(Smooth):
         return half_hessian(self, r, SPACING * total(absolute(r)) + EPSILON)
 
     def step_bend(self, r0, d):
-        # Of the end that is deeper: between the two there may be an edge.
+        # At the deeper end: between both ends there may be an edge.
         r1 = r0 + d
         return self.hessian(r1 if self.phi(r1) > self.phi(r0) else r0)
 
@@ -67,7 +67,7 @@ class OneWall(Smooth):
 
     @outlined
     def safe_time(self, r, v, pull):
-        """When a fall may meet a member, or is in another cell; 0 where it is in contact."""
+        """Return when a fall may meet a member, or is in another cell; 0 in contact."""
         if self.phi(r) > 0.0:
             return 0.0
         return self.members.field_hit(Gravity(pull.x, pull.y, pull.z), r, v).time
@@ -78,7 +78,7 @@ class OneWall(Smooth):
         return LevelStep(gap, 0.0, min(longest, max(-gap, 0.0) / speed) if speed > 0.0 else longest)
 
     def loosened(self, reach):
-        """The same where places in its frame have round-off of so much more than its own size [m]."""
+        """Return the wall for places in its frame with a round-off that is larger by that of `reach` [m]."""
         return self._replace(members=self.members.loosened(reach))
 
     def clearance(self, r):
@@ -86,9 +86,9 @@ class OneWall(Smooth):
 
     @outlined
     def discrete_gradient(self, r0, r1):
-        """Gonzalez's, with the mean of the gradients at both ends by how deep they are, which corners do not make jump.
+        """Gonzalez's, with the mean of the gradients at both ends weighted by depth, which has no jump at corners.
 
-        Where these turn by more than a wall does in a step, as at an edge towards the points, it is that of the start.
+        If these turn by more than a wall does in a step, as at an edge towards the points, the gradient at the start.
         """
         one, other = _foot(self, r0), _foot(self, r1)
         a, b = max(one.gap, 0.0), max(other.gap, 0.0)
@@ -102,7 +102,7 @@ class OneWall(Smooth):
         return g + (rest / d2) * d if d2 > 0.0 else g
 
     def push(self, r0, p, kappa):
-        # Without a push there is nothing to solve.
+        # Without a push no solution is needed.
         return newton.push(self, r0, p, kappa) if kappa != 0.0 else r0 + p
 
     def rise(self, r0, p, kappa):
@@ -116,7 +116,7 @@ class OneWall(Smooth):
 
 
 def one_wall(surface: _Field) -> _Field:
-    """The same field, of which kernels take all as one wall."""
+    """Return the same field, taken as one wall by kernels."""
     made = copy(surface)
     object.__setattr__(made, "is_one_wall", True)
     return made
@@ -135,7 +135,7 @@ def _free_rise(whole, r0, r1):
 
 @outlined
 def _first_hit(members, gravity, r, v):
-    """When the flight meets the first of the members: (time, whether it does then), from cell to cell."""
+    """Return when the flight meets the first member: (time, whether it does then), from cell to cell."""
     t, place, pace = 0.0, r, v
     for _part in range(_MOST_PARTS):
         hit = members.field_hit(gravity, place, pace)

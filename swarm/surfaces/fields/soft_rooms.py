@@ -1,8 +1,8 @@
-"""A union of several rooms as one wall: the distance outside of all rooms, of soft walls, into which points go.
+"""A union of several rooms as one wall: the distance outside all rooms, for soft walls, into which points go.
 
-The gap of a room is the largest of its walls; of a point beyond several of them the root of the sum of the squares, as
-if each were a spring by itself. That of the union is the least of its rooms: in a doorway there is no wall, and behind
-an edge between two rooms a point is pushed back by the nearer one.
+The gap of a room is the largest gap of its walls; for a point beyond several of them the root of the sum of the
+squares, as of separate springs. The gap of the union is the least of its rooms: in a doorway there is no wall, and
+behind an edge between two rooms the nearer one pushes a point back.
 """
 
 import math
@@ -21,18 +21,18 @@ from ..walls import Walls, all_walls
 from .members import SignedDistance
 from .one_wall import OneWall
 
-# What all parts of a union that is one wall have in common, besides their openings.
+# The common arguments of all parts of a union that is one wall, besides their openings.
 IN_COMMON = *LAWS, "motion", "present"
 
 
 class RoomsTogether(Record):
-    """The rooms of a union as `OneWall` asks for them."""
+    """The rooms of a union as the members of `OneWall`."""
 
     walls: Walls
 
     @outlined
     def foot(self, tree, r):
-        """The `SignedDistance` of a point."""
+        """Return the `SignedDistance` of a point."""
         gap, normal = math.inf, ZERO
         for rooms in self.walls.joined():
             for room in rooms:
@@ -54,17 +54,17 @@ class RoomsTogether(Record):
 
     @outlined
     def field_hit(self, gravity, r, v):
-        """The `Hit` where a flight leaves the last of the rooms that hold it, or goes on in another one."""
+        """Return the `Hit` where a flight leaves the last of the rooms that hold it, or continues in another one."""
         return flights.first_hit(self.walls, gravity, r, v)
 
     def loosened(self, reach):
-        """The same: rooms have no tables."""
+        """Return the same rooms: they have no tables."""
         return self
 
 
 @dataclass(frozen=True, repr=False)
 class SoftRooms(JoinedRooms):
-    """A union of several rooms, as points meet it that go into its wall."""
+    """A union of several rooms for points that go into its wall."""
 
     is_one_wall = True
 
@@ -78,6 +78,6 @@ class SoftRooms(JoinedRooms):
 
 
 def soft_rooms(union: Any) -> SoftRooms:
-    """A union of several rooms as one wall, with what all of its parts have in common."""
+    """Return a union of several rooms as one wall, with the common arguments of all of its parts."""
     one = union.rooms[0][0]
     return SoftRooms(rooms_of=union.rooms, **{name: getattr(one, name) for name in IN_COMMON})

@@ -1,1 +1,1 @@
-"""Walls that move, as kernels take them."""
+"""Walls that move, in kernels."""

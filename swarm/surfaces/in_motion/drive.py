@@ -1,7 +1,7 @@
-"""The motion of a wall as kernels take it in one frame, and its pose at one instant.
+"""The motion of a wall in one frame, as a record for kernels, and its pose at one instant.
 
-A wall xi of the frame is at x = c + d + A (xi - c), with the displacement d(t) and the rotation A(t) about c. Times
-count back from the end of the frame under way, so that they have the digits of a frame and not those of the run.
+A point xi of the wall's frame is at x = c + d + A (xi - c), with the displacement d(t) and the rotation A(t) about c.
+Times count back from the end of the current frame, so that they have the digits of a frame and not those of the run.
 """
 
 import math
@@ -32,11 +32,11 @@ class RotationRows(Record):
     z: Vec
 
     def out(self, a):
-        """A a"""
+        """Return A a."""
         return Vec(dot(self.x, a), dot(self.y, a), dot(self.z, a))
 
     def back(self, a):
-        """A^T a"""
+        """Return A^T a."""
         return self.x * a.x + self.y * a.y + self.z * a.z
 
 
@@ -49,19 +49,19 @@ class PoseDerivatives(Record):
     turn: Any
 
     def out(self, a):
-        """A direction of the frame of the wall in the scene."""
+        """Return a direction of the frame of the wall in the scene."""
         return a if self.turn is None else self.turn.out(a)
 
     def back(self, a):
-        """A direction of the scene in the frame of the wall."""
+        """Return a direction of the scene in the frame of the wall."""
         return a if self.turn is None else self.turn.back(a)
 
     def place_out(self, center, r):
-        """A point of the frame of the wall in the scene: c + d + A (r - c)."""
+        """Return a point of the frame of the wall in the scene: c + d + A (r - c)."""
         return (r if self.turn is None else center + self.turn.out(r - center)) + self.shift
 
     def place_back(self, center, r):
-        """A point of the scene in the frame of the wall."""
+        """Return a point of the scene in the frame of the wall."""
         r = r - self.shift
         return r if self.turn is None else center + self.turn.back(r - center)
 
@@ -73,7 +73,7 @@ class Wave(Record):
     versine: float
 
     def later(self, angle):
-        """The wave of an angle that is larger by so little, `LITTLE_ANGLE` at most, without another sine."""
+        """Return the wave of an angle that is larger by at most `LITTLE_ANGLE`, without another sine."""
         cosine, versine = 1.0 - self.versine, 0.5 * (angle * angle)
         sine = angle - angle * versine * (1.0 / 3.0)
         return Wave(
@@ -82,7 +82,7 @@ class Wave(Record):
 
 
 def wave_of(angle):
-    """The `Wave` of an angle."""
+    """Return the `Wave` of an angle."""
     return Wave(*sine_and_versine(angle))
 
 
@@ -94,7 +94,7 @@ class Swing(Record):
     rate: float
 
     def at(self, wave):
-        """Its displacement and the first two derivatives, from the `Wave` of its angle."""
+        """Return its displacement and the first two derivatives, from the `Wave` of its angle."""
         s, versine = wave
         c = 1.0 - versine
         return (
@@ -104,20 +104,20 @@ class Swing(Record):
         )
 
     def amplitude(self):
-        """The largest |C cos a + S sin a|."""
+        """Return the largest |C cos a + S sin a|."""
         c, s, both = square(self.cosine), square(self.sine), dot(self.cosine, self.sine)
         half = 0.5 * (c - s)
         return math.sqrt(0.5 * (c + s) + math.sqrt(half * half + both * both))
 
     def mean_velocity(self, middle, h):
-        """w sinc(w h/2) (S cos w m - C sin w m) over a time h around the middle m."""
+        """Return w sinc(w h/2) (S cos w m - C sin w m) over a time h around the middle m."""
         angle = self.rate * middle
         here = self.sine * math.cos(angle) - self.cosine * math.sin(angle)
         return (self.rate * _sinc(0.5 * self.rate * h)) * here
 
 
 class Swings(Record):
-    """All swings of a motion, s(t) = sum_k C_k (cos - 1) + S_k sin from their middle on, and what bounds them.
+    """All swings of a motion, s(t) = sum_k C_k (cos - 1) + S_k sin relative to their middle, and their bounds.
 
     |s|^2 + |s'|^2/w^2 of one swing is |C|^2 + |S|^2 = Q^2 at any time.
     """
@@ -125,18 +125,18 @@ class Swings(Record):
     each: tuple[Any, ...]
 
     def turned(self, vector_in):
-        """The swings in a frame that is turned."""
+        """Return the swings in a frame that is turned."""
         return Swings(tuple(Swing(vector_in(one.cosine), vector_in(one.sine), one.rate) for one in self.each))
 
     def amplitude(self):
-        """Bound of |s|."""
+        """Return a bound of |s|."""
         found = 0.0
         for swing in self.each:
             found += swing.amplitude()
         return found
 
     def along(self, n):
-        """Bounds of |n.s| and |n.s'|."""
+        """Return bounds of |n.s| and |n.s'|."""
         amplitude = speed = 0.0
         for swing in self.each:
             c, s = dot(n, swing.cosine), dot(n, swing.sine)
@@ -145,7 +145,7 @@ class Swings(Record):
         return amplitude, speed
 
     def moments(self):
-        """sum_k Q_k w_k^p for p = 0 to 3"""
+        """Return sum_k Q_k w_k^p for p = 0 to 3."""
         found = 0.0, 0.0, 0.0, 0.0
         for swing in self.each:
             rate, mine = abs(swing.rate), math.sqrt(square(swing.cosine) + square(swing.sine))
@@ -162,17 +162,17 @@ class Track(Record):
     cubics: Array  # (4, 3, pieces)
     end: Vec
     now: float
-    often: float  # how many pieces there are a second on average
-    piece: Any = None  # that of the one instant that is asked for, where it is known
+    often: float  # the mean number of pieces in a second
+    piece: Any = None  # the piece at the instant of evaluation, if it is known
 
     def piece_at(self, t):
-        """The piece of a time."""
+        """Return the piece at a time."""
         now, last = self.now + t, self.times.size - 2
-        # Of pieces that are of one length it is known at once.
+        # The guess is right for pieces of one length.
         guess = int(min(max((now - self.times[0]) * self.often, 0.0), float(last)))
         if self.times[guess] <= now < self.times[guess + 1]:
             return guess
-        # Without a branch: which half of the rest it is in no processor foresees.
+        # Without a branch: no processor predicts which half of the rest it is in.
         low, rest = 0, last + 1
         while rest > 1:
             half = rest // 2
@@ -181,7 +181,7 @@ class Track(Record):
         return low
 
     def at(self, t):
-        """Its value and first two derivatives."""
+        """Return its value and first two derivatives."""
         low = index(self.piece_at(t) if self.piece is None else self.piece)
         s, cubics = self.now + t - self.times[low], self.cubics
         a, b, c, d = (Vec(cubics[k, 0, low], cubics[k, 1, low], cubics[k, 2, low]) for k in range(4))
@@ -192,7 +192,7 @@ class Track(Record):
         )
 
     def mean_velocity(self, middle, h):
-        """By Simpson's rule, exact within a piece."""
+        """Return the mean velocity by Simpson's rule, exact within a piece."""
         first, second, third = self.at(middle - 0.5 * h)[1], self.at(middle)[1], self.at(middle + 0.5 * h)[1]
         return (first + 4.0 * second + third) * (1.0 / 6.0)
 
@@ -207,7 +207,7 @@ class Turn(Record):
     rate: float
 
     def at(self, wave):
-        """The rows of A, from the `Wave` of its angle."""
+        """Return the rows of A, from the `Wave` of its angle."""
         # A(t) = A R, with the rotation R about the same axis: the rows of A, turned back.
         s, versine = wave
         k = self.axis
@@ -217,13 +217,13 @@ class Turn(Record):
         )
 
     def mean_velocity(self, middle, h, arm):
-        """(A1 - A0) rho/h of an arm rho in the frame of the wall: w sinc(w h/2) k x A(m) rho."""
+        """Return (A1 - A0) rho/h of an arm rho in the frame of the wall: w sinc(w h/2) k x A(m) rho."""
         turned = self.at(wave_of(self.rate * middle)).out(arm)
         return (self.rate * _sinc(0.5 * self.rate * h)) * cross(self.axis, turned)
 
 
 def _sum(some, others):
-    """The sums of a displacement and its derivatives; what is None is 0, and no addition of a lane."""
+    """Return the sums of a displacement and its derivatives; None is 0, and costs a lane no addition."""
     if some is None or others is None:
         return others if some is None else some
     return tuple(b if a is None else a + b for a, b in zip(some, others, strict=True))
@@ -234,39 +234,39 @@ def _sinc(x):
 
 
 class Drive(Record):
-    """The motion of a wall, as kernels take it in one frame."""
+    """The motion of a wall in one frame, as a record for kernels."""
 
-    # A motion without the one or the other adds no zeros in lanes.
+    # A motion without one of these parts adds no zeros in lanes.
     shift: Any  # d at the end of the frame, or None
-    velocity: Any  # of the translation, or None
+    velocity: Any  # velocity of the translation, or None
     swings: tuple[Any, ...]  # each a `Swing`
     track: Any  # None or `Track`
-    turn: Any  # None or `Turn`; None also where the rotation leaves the surface as it is
+    turn: Any  # None or `Turn`; None also if the rotation leaves the surface unchanged
     spin: Any  # the angular velocity, or None
     center: Vec
     fastest: float  # bound of |d'| [m/s]
     hardest: float  # bound of |d''| [m/s^2]
     jerk: float  # bound of |d'''| [m/s^3]
     time_scale: float  # a time in which it changes little [s]
-    late: float  # its fastest speed times the time [m], which the round-off of its place is relative to
+    late: float  # its largest speed times the time [m], the scale of the round-off of its place
     jerks: Vec  # bounds of the components of d''' [m/s^3]
-    waves: Any = None  # those of the one instant that is asked for, where they are known: see `waves_at`
+    waves: Any = None  # the waves at the instant of evaluation, if they are known: see `waves_at`
 
     def rates(self):
-        """The rate of each angle: of the swings, then of the rotation."""
+        """Return the rate of each angle: of the swings, then of the rotation."""
         rates = tuple(swing.rate for swing in self.swings)
         return rates if self.turn is None else (*rates, self.turn.rate)
 
     def waves_at(self, remaining):
-        """The `Wave` of each angle when so much of the frame is left [s]."""
+        """Return the `Wave` of each angle when `remaining` is left of the frame [s]."""
         return tuple(wave_of(rate * -remaining) for rate in self.rates())
 
     def on_piece(self, piece):
-        """The motion at one instant, at which a path is on this piece."""
+        """Return the motion at one instant, at which a path is on this piece."""
         return self if self.track is None else self._replace(track=self.track._replace(piece=piece))
 
     def pose(self, remaining):
-        """The `PoseDerivatives` when so much of the frame is left [s]."""
+        """Return the `PoseDerivatives` when `remaining` is left of the frame [s]."""
         waves = self.waves_at(remaining) if self.waves is None else self.waves
         turn = None if self.turn is None else self.turn.at(waves[len(self.swings)])
         swung: Any = None
@@ -278,8 +278,8 @@ class Drive(Record):
         return PoseDerivatives(*(ZERO if one is None else one for one in moved), turn)
 
     def mean_velocity(self, middle, h):
-        """The mean of d' over a time h around the middle."""
-        # Not the difference of two places over the time: of a short step that has no digits left, and a particle that
+        """Return the mean of d' over a time h around the middle."""
+        # Not the difference of two places over the time: for a short step it has no digits left, and a particle that
         # friction stops takes ever shorter ones.
         swings = ZERO
         for swing in self.swings:
@@ -288,20 +288,20 @@ class Drive(Record):
         return steady + swings + (ZERO if self.track is None else self.track.mean_velocity(middle, h))
 
     def middle(self, t):
-        """Its displacement without swings and spline at a time since the end of the frame, or None."""
+        """Return its displacement without swings and spline at a time since the end of the frame, or None."""
         return self.shift if self.velocity is None else self.shift + t * self.velocity
 
     def swing_center(self, t):
-        """Its displacement without swings at a time since the end of the frame, if it moves in no other ways."""
+        """Return its displacement without swings at a time since the end of the frame, if it has no other motion."""
         middle = self.middle(t)
         for swing in self.swings:
             middle = middle - swing.cosine
         return middle
 
     def passage(self, body, r, v, remaining):
-        """The `Passage` of a straight flight, with so much of the frame left, through what a surface never reaches.
+        """Return the `Passage` of a straight flight through the core of a surface, with `remaining` left of the frame.
 
-        None where the surface has no core, or moves in other ways than swings.
+        None if the surface has no core, or has other motions than swings.
         """
         if not self.only_swings() or not body.has_core:
             return None
@@ -309,11 +309,11 @@ class Drive(Record):
         return body.passage(r - self.swing_center(-remaining), w, Swings(self.swings))
 
     def only_swings(self):
-        """Whether it moves uniformly but for swings."""
+        """Whether its motion is uniform except for swings."""
         return self.turn is None and self.track is None
 
     def angular_speed(self):
-        """The angular speed of the surface [rad/s]."""
+        """Return the angular speed of the surface [rad/s]."""
         return 0.0 if self.turn is None else abs(self.turn.rate)
 
 
@@ -321,8 +321,8 @@ class Drive(Record):
 
 
 def drive_of(surface: Surface, moment: float) -> Drive:
-    """The motion of a surface in the frame that ends at a moment [s]."""
-    # A guide says how impacts move a wall, which is at rest before.
+    """Return the motion of a surface in the frame that ends at a moment [s]."""
+    # A guide describes how impacts move a wall, which is at rest before.
     parts = [one for one in motions.parts_of(surface.motion) if not isinstance(one, motions.Guide)]
     velocity, track, turn, spin, center = None, None, None, None, ZERO
     harmonics: list[motions.Led] = []
@@ -361,7 +361,7 @@ def drive_of(surface: Surface, moment: float) -> Drive:
                 x, y, z = map(vec, motions.pose(one, moment).turn.tolist())
                 turn = Turn(x, y, z, _vector(axis), one.rate)
             else:
-                # It is carried along a circle, and turned about its own centre, which leaves it as it is.
+                # It moves along a circle, and turns about its own centre, which leaves it unchanged.
                 circle = one.harmonic(about)
                 harmonics.append(circle)
                 center, shift = _vector(about), shift + circle.position(moment) - circle.start
@@ -380,7 +380,7 @@ def drive_of(surface: Surface, moment: float) -> Drive:
 
 
 def _swing(led: motions.Led, moment: float) -> Swing:
-    """The swing of what is led, in the frame that ends at a moment [s]."""
+    """Return the swing of a led motion, in the frame that ends at a moment [s]."""
     c, s = math.cos(led.rate * moment), math.sin(led.rate * moment)
     # C cos(a + b) + S sin(a + b), with the angle a at the end of the frame
     return Swing(_vector(c * led.cosine + s * led.sine), _vector(c * led.sine - s * led.cosine), led.rate)

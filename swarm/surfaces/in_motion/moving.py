@@ -1,6 +1,6 @@
 """The walls of a scene, some of which move.
 
-`at` and `during` make of them those at one instant, or over one step, which are surfaces like any other.
+`at` and `during` return the walls at one instant, or over one step, which are surfaces like any other.
 """
 
 import itertools
@@ -31,27 +31,27 @@ class Moving(Record):
     posed, accelerates = Posed, True
 
     def grown(self, radius):
-        """What the centre of a ball meets."""
+        """Return the wall that the centre of a ball meets."""
         return self._replace(body=self.body.grown(radius))
 
     def count(self):
-        """The number of walls of a field."""
+        """Return the number of walls of a field."""
         return self.body.count()
 
     def during(self, remaining, after):
-        """The wall over a step; at its start and end so much of the frame is left [s]."""
+        """Return the wall over a step; at its start `remaining` is left of the frame [s], at its end `after`."""
         start = self.drive.pose(remaining)
         end = start if after is remaining else self.drive.pose(after)
-        # The waves of this instant are those of no other.
+        # The waves hold at one instant only.
         return self.posed(self.body, start, end, self.drive._replace(waves=None), remaining, after)
 
     def seen(self, flight, t):
-        """A particle as safe steps to the wall see it after a time of its flight, or None if no steps are needed."""
+        """Return the `Seen` of a particle after a time of its flight, for safe steps; None if none are needed."""
         remaining = flight.remaining - t
         return flight.seen(t, self.during(remaining, remaining), flight.pull)
 
     def on_piece(self, piece):
-        """The wall at one instant, at which its path is on this piece."""
+        """Return the wall at one instant, at which its path is on this piece."""
         return self._replace(drive=self.drive.on_piece(piece))
 
 
@@ -62,7 +62,7 @@ class TurningWall(Moving):
 
 
 class Translated(Moving):
-    """A wall in uniform translation, with or without a spin that leaves the surface as it is."""
+    """A wall in uniform translation, with or without a spin that leaves the surface unchanged."""
 
     posed, accelerates = Drifting, False
 
@@ -95,24 +95,24 @@ class Carried(Walls):
 
 
 class Marched(Carried):
-    """The walls of a scene, some of which do not move uniformly, or are a field that moves: flights take safe steps."""
+    """The walls of a scene, some of which move other than uniformly, or are a moving field: flights take safe steps."""
 
     accelerate = True
 
 
 class Strided(Marched):
-    """The same, with safe steps that are all taken in lanes: see strides.py."""
+    """`Marched` walls with all safe steps taken in lanes: see strides.py."""
 
 
 class Aimed(Strided):
-    """The same, of which most flights need no safe step: see aim.py."""
+    """`Strided` walls to which most flights need no safe step: see aim.py."""
 
     def drives(self):
-        """The motion of each surface that moves other than uniformly."""
+        """Return the motion of each surface that moves other than uniformly."""
         return tuple(wall.drive for wall in self.each if isinstance(wall, Moving) and wall.accelerates)
 
     def with_waves(self, waves):
-        """The walls at one instant, at which the waves of all of these motions are these; () if they are not known."""
+        """Return the walls at one instant with the waves of all of these motions; () if the waves are not known."""
         if not waves:
             return self
         made: tuple[Any, ...] = ()
@@ -125,11 +125,11 @@ class Aimed(Strided):
 
 
 class Leaping(Marched):
-    """The same, with fields of facets alone: lanes leap through their cells."""
+    """`Marched` walls with fields of facets only: lanes leap through their cells."""
 
 
 def _during(wall, last, remaining, after):
-    """A wall over a step; `last` is the one before it then."""
+    """Return a wall over a step; `last` is the wall before it over this step."""
     if isinstance(wall, Following):
         return last._replace(body=wall.body)
     return wall.during(remaining, after) if isinstance(wall, Moving) else wall
@@ -142,10 +142,10 @@ def carried(
     fields: Sequence[Surface], surfaces: Sequence[Surface], moment: float, largest: float | None = None,
     in_rooms: bool = False,
 ) -> Walls:  # fmt: skip
-    """The walls of a scene in the frame that ends at a moment [s]; those of fields are before all others.
+    """Return the walls of a scene in the frame that ends at a moment [s]; those of fields are before all others.
 
-    Of points, or of balls of this radius at most [m]. `in_rooms` is whether some are of unions, the rooms of which are
-    asked each by itself.
+    They are for points, or for balls up to this radius [m]. `in_rooms` is whether some are of unions; their rooms
+    are tested one by one.
     """
     of_surfaces = [walls_of(surface, moment, largest) for surface in surfaces]
     each = of_surfaces if in_rooms else _led_together(surfaces, of_surfaces)
@@ -163,9 +163,9 @@ def carried(
 
 
 def _led_together(surfaces: Sequence[Surface], of_surfaces: Sequence[list[Any]]) -> list[list[Any]]:
-    """The walls of surfaces; those that move as the surface before them follow it, and have one pose with it.
+    """Return the walls of surfaces; walls that move like the surface before them follow it, and share its pose.
 
-    Five boxes that make a cup are one motion for a kernel, which is as much less to compile.
+    Five boxes that make a cup are one motion for a kernel, and less to compile.
     """
     found = list(of_surfaces)
     for k in range(1, len(found)):
@@ -190,18 +190,18 @@ def _may_leap(field: Field) -> bool:
 
 
 def _may_stride(walls: list[Any]) -> bool:
-    """Whether lanes can take the safe steps of the walls of a surface; of a spline each would look for its piece."""
+    """Whether lanes can take the safe steps of the walls of a surface; for a spline each would search its piece."""
     return walls[0].drive.track is None and all(wall.body.has_levels for wall in walls)
 
 
 def _may_aim(walls: list[Any]) -> bool:
-    """Whether most first hits of the walls of a surface are proven by what two Taylor polynomials bound."""
+    """Whether the bounds by two Taylor polynomials prove most first hits of the walls of a surface."""
     swings = walls[0].drive.turn is None
     return all(wall.body.proves or (swings and wall.body.has_core) for wall in walls)
 
 
 def walls_of(surface: Surface, moment: float, largest: float | None = None) -> list[Any]:
-    """The walls of a surface in the frame that ends at a moment [s], as `carried` takes them."""
+    """Return the walls of a surface in the frame that ends at a moment [s], as for `carried`."""
     first, *others = walls_then(surface, moment, largest)
     if surface.motion is None:
         return [first, *others]
@@ -217,7 +217,7 @@ def _is_uniform(drive: Drive) -> bool:
 
 
 def lacks_bend(surface: Surface) -> bool:
-    """Whether a surface moves so that its hits need safe steps, and does not bound its bend."""
+    """Whether hits of a moving surface need safe steps for which it lacks bounds of its curvature."""
     if surface.mass is not None and surface.inertia is None:
         steps = isinstance(surface.motion, Guide) and surface.motion.stiffness > 0.0
     else:

@@ -1,9 +1,9 @@
-"""A wall that moves, at one instant or over one step: what is asked of a surface is asked in the frame of the wall.
+"""A wall that moves, at one instant or over one step: calls are forwarded to the surface in the frame of the wall.
 
-A flight to a wall in uniform translation ends as at a wall at rest; to any other it goes by safe steps, safe.py.
+A flight to a wall in uniform translation ends as at a wall at rest; to any other it takes safe steps, safe.py.
 
 In the frame of a wall that is displaced by d(t) and does not turn a step goes from rho0 = r0 - d0 by
-rho1 - rho0 = r1 - r0 - (d1 - d0): it is that at a wall at rest, with the free displacement p - (d1 - d0).
+rho1 - rho0 = r1 - r0 - (d1 - d0): it is a step at a wall at rest, with the free displacement p - (d1 - d0).
 """
 
 from typing import Any
@@ -25,15 +25,15 @@ class Posed(Framed):
     pose: PoseDerivatives
     end: PoseDerivatives  # at the end of the step
     drive: Drive
-    remaining: float  # of the frame [s]
-    after: float  # of the frame, at the end of the step [s]
+    remaining: float  # left of the frame [s]
+    after: float  # left of the frame at the end of the step [s]
 
     def wall(self, number):
-        """One of the walls of a field."""
+        """Return one of the walls of a field."""
         return self._replace(body=self.body.wall(number))
 
     def later(self, t):
-        """The wall, or field, after a time [s]."""
+        """Return the wall, or field, after a time [s]."""
         remaining = self.remaining - t
         pose = self.drive.pose(remaining)
         return self._replace(pose=pose, end=pose, remaining=remaining, after=remaining)
@@ -41,20 +41,20 @@ class Posed(Framed):
     # --- The frame of the wall ---
 
     def own_place(self, r):
-        """A point in the frame of the wall."""
+        """Return a point in the frame of the wall."""
         return self.pose.place_back(self.drive.center, r)
 
     def own_end(self, r):
-        """A point in the frame of the wall, at the end of the step."""
+        """Return a point in the frame of the wall, at the end of the step."""
         return self.end.place_back(self.drive.center, r)
 
     def own_velocity(self, r, v):
-        """The velocity of a particle in the frame of the wall."""
+        """Return the velocity of a particle in the frame of the wall."""
         w = v - self.pose.velocity
         return w if self.pose.turn is None else self.pose.back(w) - cross(self.drive.spin, self.pose.back(self.arm(r)))
 
     def own_pull(self, r, v, pull):
-        """The acceleration of a free particle in the frame of the wall."""
+        """Return the acceleration of a free particle in the frame of the wall."""
         at_rest = pull is ZERO and self.pose.acceleration is ZERO
         felt = ZERO if at_rest else pull - self.pose.acceleration
         if self.pose.turn is None:
@@ -65,15 +65,15 @@ class Posed(Framed):
         return turns if at_rest else self.pose.back(felt) + turns
 
     def arm(self, r):
-        """From the centre of the rotation to a point."""
+        """Return the vector from the centre of the rotation to a point."""
         return r - self.drive.center - self.pose.shift
 
     def arm_length(self, r):
-        """The distance of a point from the centre of the rotation; 0 where the frame does not turn."""
+        """Return the distance of a point from the centre of the rotation; 0 if the frame does not turn."""
         return 0.0 if self.pose.turn is None else norm(self.arm(r))
 
     def middle(self):
-        """The middle of the step, from the end of the frame on."""
+        """Return the middle of the step, as a time since the end of the frame."""
         return -0.5 * (self.remaining + self.after)
 
     place_in, end_in = own_place, own_end
@@ -82,18 +82,18 @@ class Posed(Framed):
         return self.pose.place_out(self.drive.center, r)
 
     def end_out(self, r):
-        """A point of the frame of the wall at the end of the step, in the scene."""
+        """Return a point of the frame of the wall at the end of the step, in the scene."""
         return self.end.place_out(self.drive.center, r)
 
     def vector_out(self, a):
         return self.pose.out(a)
 
     def way_in(self, p):
-        """The free displacement of a step in the frame of a wall that does not turn."""
+        """Return the free displacement of a step in the frame of a wall that does not turn."""
         return p - self.displacement()
 
     def normal_out(self, n):
-        """A normal of the frame of the wall, of a step, in the scene."""
+        """Return a normal of a step, from the frame of the wall, in the scene."""
         if self.pose.turn is None:
             return n
         # rho1 - rho0 = M^-1 (r1 - r0 - way) with M = (A0 + A1)/2, so n becomes M^-T n = M S^-2 n, where S is cos(a/2)
@@ -106,7 +106,7 @@ class Posed(Framed):
 
     # --- At this instant ---
 
-    # A rotation that leaves the surface as it is turns what it is made of.
+    # A rotation that leaves the surface unchanged still turns its material.
 
     def velocity(self, r):
         moved, spin = self.pose.velocity, self.drive.spin
@@ -131,7 +131,7 @@ class Posed(Framed):
         return flight.seen(t, self.later(t), flight.pull)
 
     def sees(self, gravity, r, v):
-        """A particle in the frame of the wall now, as `Seen`."""
+        """Return a particle in the frame of the wall now, as `Seen`."""
         return self.seen(flight_of(r, v, gravity, self.remaining), 0.0)
 
     def first_hit(self, r, v):
@@ -142,11 +142,11 @@ class Posed(Framed):
         return found.time, found.wall >= 0.0
 
     def field_hit(self, gravity, r, v):
-        """The first `Hit` with the bodies of a field, or how far the flight is surely free."""
+        """Return the first `Hit` with the bodies of a field, or the time until which the flight is surely free."""
         return safe.march_alone(Walls((Field(self),)), r, v, gravity, self.remaining)
 
     def until_next_cell(self, r, v):
-        """When a straight flight may meet another body of a field."""
+        """Return when a straight flight may meet another body of a field."""
         return safe.until_next_cell(self.body, self.sees(None, r, v), self.remaining)
 
     is_quartic, may_be_far, has_levels, leaves_once = False, True, False, False
@@ -206,14 +206,14 @@ class Posed(Framed):
 
 
 class Drifting(Posed):
-    """The same of a wall in uniform translation: a flight ends as at a wall at rest."""
+    """A `Posed` wall in uniform translation: a flight ends as at a wall at rest."""
 
     def velocity_in(self, v):
-        """A velocity in the frame of the wall."""
+        """Return a velocity in the frame of the wall."""
         return v - self.pose.velocity
 
     def vector_in(self, a):
-        """An acceleration there."""
+        """Return an acceleration in the frame of the wall."""
         return a
 
     gravity_in = vector_in
@@ -222,7 +222,7 @@ class Drifting(Posed):
     may_be_far = property(lambda self: self.body.may_be_far)
 
     def steps(self, gravity, r, v):
-        # As at a wall at rest where the level is known as a whole: else lanes ask for the hit.
+        # As at a wall at rest if the level is known as a whole; otherwise lanes call for the hit.
         return Framed.steps(self, gravity, r, v) if gravity is not None and self.is_quartic else None
 
     first_hit, falling_hit, safe_time = Framed.first_hit, Framed.falling_hit, Framed.safe_time

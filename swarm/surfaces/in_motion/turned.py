@@ -1,13 +1,13 @@
 """A wall that turns, at one instant or over one step of a method with a discrete gradient.
 
-With A0 and A1 at both ends of a step, M = (A0 + A1)/2 and what the wall carries its points by, w (`swept`), a step in
-its frame is rho1 - rho0 = M^-1 (r1 - r0 - w). So the normal n = M^-T D of the scene has n.(r1 - r0 - w) = D.(rho1 -
-rho0), the change of q: a force along it does the work that the energy lacks, to round-off, and it is as symmetric in
-time as D. With where the free step ends in the frame, f = A1^T (r0 + p - c - d1) + c, the end is
+With A0 and A1 at both ends of a step, M = (A0 + A1)/2 and the displacement w of points with the wall (`swept`), a step
+in its frame is rho1 - rho0 = M^-1 (r1 - r0 - w). So the normal n = M^-T D of the scene has n.(r1 - r0 - w) = D.(rho1 -
+rho0), the change of q: a force along it does the work that conserves energy, to round-off, and it is as symmetric in
+time as D. With the end of the free step in the frame, f = A1^T (r0 + p - c - d1) + c, the end is
     rho1 = f - kappa Q D(rho0, rho1),   Q = A1^T M^-T.
-As A1 is A0 turned about the axis k by the angle w h of the step, Cayley's form of that,
+A1 is A0 turned about the axis k by the angle w h of the step; in Cayley's form,
     A1 - A0 = t x (A0 + A1),   Q D = D - t x D,   t = tan(w h/2) k   (`tilt`).
-Where the wall is flat, D is along its normal n and n.Q n = 1: across the wall the end is that of the body at rest.
+If the wall is flat, D is along its normal n and n.Q n = 1: across the wall the end is that of the body at rest.
 """
 
 from ...kernel.elementary import sine_and_versine
@@ -16,10 +16,10 @@ from .posed import Posed
 
 
 class Turned(Posed):
-    """The wall."""
+    """A wall that turns."""
 
     def tilt(self):
-        """t"""
+        """Return t."""
         turn = self.drive.turn
         sine, versine = sine_and_versine(turn.rate * (self.remaining - self.after))
         return (sine / (2.0 - versine)) * turn.axis
@@ -44,7 +44,7 @@ class Turned(Posed):
         return self.body.rise(start, free, kappa)
 
     def free_rise(self, r, p):
-        # As if the body were at rest: the tilt changes the derivative alone.
+        # As for a body at rest: the tilt changes only the derivative.
         start = self.own_place(r)
         return self.body.free_rise(start, self.own_end(r + p) - start)
 

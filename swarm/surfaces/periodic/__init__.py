@@ -1,1 +1,1 @@
-"""A cell that repeats, and the images of its walls."""
+"""A periodic cell, and the images of its walls."""

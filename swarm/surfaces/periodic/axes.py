@@ -1,6 +1,6 @@
-"""One axis of a cell that repeats: where a coordinate is in it, and when it leaves it.
+"""One axis of a periodic cell: the place of a coordinate in it, and when the coordinate leaves it.
 
-A length is a float, `Free` where all walls are the same along the axis, or None where the cell does not repeat.
+A length is a float, `Free` if all walls are the same along the axis, or None along an axis without a period.
 """
 
 import math
@@ -11,11 +11,11 @@ from ...kernel.jit import outlined, select
 from ...kernel.record import Record
 from ..time_of_impact.course import rise_time
 
-# A flight that leaves ends so far beyond the face, in lengths of the cell; a step may end at most twice as far.
+# A flight that leaves ends this far beyond the face, in lengths of the cell; a step may end at most twice as far.
 _BEYOND = 5e-10
-# A flight that goes on over cells ends after so many; their number is a float with digits to spare for the position.
+# A flight over cells ends after this number; their number is a float with digits to spare for the position.
 CELLS = 2.0**40
-# A flight may end later by this part of a length of the cell, so that what it leaves of the frame is exact.
+# A flight may end later by this part of a length of the cell, so that the rest of the frame is exact.
 _LATER = 1e-4
 
 
@@ -25,20 +25,20 @@ class Free(Record):
     length: float
 
 
-# --- Where it is -----------------------------------------------------------------------------------------
+# --- The place in the cell -------------------------------------------------------------------------------
 
 
 def length_of(length):
-    """The length of the cell along an axis, 0 where it does not repeat."""
+    """Return the length of the cell along an axis, 0 without a period."""
     return 0.0 if length is None else length.length if isinstance(length, Free) else length
 
 
 def image_of(length, x):
-    """The number of lengths from a coordinate to the cell."""
+    """Return the number of lengths from a coordinate to the cell."""
     if length is None:
         return 0.0
     length = length_of(length)
-    # Below 0 by so little that the other face is what it rounds to: there it is on this one.
+    # If a coordinate just below 0 rounds to the upper face, it is on the lower one.
     n = select(x >= length, 1.0, select((x < 0.0) & (x + length < length), -1.0, 0.0))
     if -length < x < 2.0 * length:
         return n
@@ -51,12 +51,12 @@ def _whole_lengths(length, x):
     # The quotient is rounded.
     back = x - n * length
     n = n + select(back >= length, 1.0, select(back < 0.0, -1.0, 0.0))
-    # And so is the product, where there are many.
+    # And so is the product, if the number is large.
     return n + select(x - n * length >= length, 1.0, 0.0)
 
 
 def inside(length, x, n):
-    """The coordinate of the same place in the cell, which is so many lengths away."""
+    """Return the coordinate of the same place in the cell, `n` lengths away."""
     if length is None:
         return x
     # One length beyond the face the difference is exact.
@@ -80,7 +80,7 @@ def has_faces(length):
 
 
 def is_beyond_face(length, x):
-    """Whether a coordinate is farther outside than what leaves goes."""
+    """Whether a coordinate is farther outside than the end of a flight that leaves."""
     if not has_faces(length):
         return False
     beyond = 2.0 * _BEYOND * length
@@ -88,20 +88,20 @@ def is_beyond_face(length, x):
 
 
 def excess(length, x):
-    """By how much a coordinate is beyond the place where a step that leaves is to end; below 0 within."""
+    """Return by how much a coordinate is beyond the place where a step that leaves is to end; below 0 within."""
     return abs(x - 0.5 * length) - (0.5 + _BEYOND) * length if has_faces(length) else -math.inf
 
 
-# --- When it leaves --------------------------------------------------------------------------------------
+# --- The time at which it leaves -------------------------------------------------------------------------
 
 
 def time_to_leave(length, x, v, pull):
-    """When a coordinate is a little beyond the faces."""
+    """Return when a coordinate is a little beyond the faces."""
     if not has_faces(length):
         return time_far(length, x, v, pull)
     if pull is None:
         edge = select(v > 0.0, length + _BEYOND * length, -_BEYOND * length)
-        # Divisions are what a pass takes here: one an axis, which gaps ask for again.
+        # Divisions dominate the time of a pass: one for each axis, which gaps use again.
         return select(v != 0.0, (edge - x) * (1.0 / v), math.inf)
     beyond = _BEYOND * length
     up = rise_time(x - length - beyond, 0.5 * v, 0.5 * pull)
@@ -110,7 +110,7 @@ def time_to_leave(length, x, v, pull):
 
 
 def time_out(pull, ends, x, v):
-    """When a coordinate that is between two ends leaves them."""
+    """Return when a coordinate between two ends leaves them."""
     low, high = ends
     if pull is None:
         edge = select(v > 0.0, high, low)
@@ -120,7 +120,7 @@ def time_out(pull, ends, x, v):
 
 
 def time_far(length, x, v, pull):
-    """When a coordinate is as many cells away as a flight may go."""
+    """Return when a coordinate is as many cells away as a flight may go."""
     if length is None:
         return math.inf
     far = CELLS * length_of(length)
@@ -128,27 +128,27 @@ def time_far(length, x, v, pull):
 
 
 def room_along(length):
-    """The distance by which a flight may end farther along an axis for the sake of its time."""
+    """Return the distance by which a flight may end farther along an axis to make its time exact."""
     return _LATER * length if has_faces(length) else math.inf
 
 
 def fastest(pull, v, t):
-    """A speed that is not exceeded within a time t."""
+    """Return a speed that is not exceeded within a time t."""
     return abs(v) if pull is None else abs(v) + abs(pull) * t
 
 
 def pulls(gravity):
-    """Gravity along each axis; three times None without gravity."""
+    """Return gravity along each axis; three times None without gravity."""
     return (None, None, None) if gravity is None else (gravity.x, gravity.y, gravity.z)
 
 
 def least(x, y, z):
-    """The least of three."""
+    """Return the least of three."""
     first = select(x < y, x, y)
     return select(first < z, first, z)
 
 
 def most(x, y, z):
-    """The greatest of three."""
+    """Return the greatest of three."""
     first = select(x > y, x, y)
     return select(first > z, first, z)

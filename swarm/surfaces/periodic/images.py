@@ -1,4 +1,4 @@
-"""The images of a surface in a cell that repeats: what of it, shifted by the period, reaches into the cell."""
+"""The images of a surface in a periodic cell: those that, shifted by the period, reach into the cell."""
 
 import itertools
 import math
@@ -17,14 +17,14 @@ from ..outlines.outlined import Outlined
 from ..surface import Box, Surface
 
 Lengths = tuple[float | None, float | None, float | None]
-# What is closer to a face than this part of the period counts as reaching over it: a step may end a little beyond.
+# A surface closer to a face than this part of the period counts as reaching over it: a step may end a little beyond.
 _NEAR = 1e-3
 # The number of points at which the slope of a surface along an axis is evaluated, and the fraction of a slope that
 # counts as 0.
 _POINTS, _NO_SLOPE = 256, 1e-14
-# Of the period, the part by which a cavity may be outside of the cell: round-off.
+# The part of the period by which a cavity may be outside the cell: round-off.
 _ROUND_OFF = 1e-12
-# Of a surface with a mass in such a cell.
+# For a surface with a mass in a periodic cell.
 MASS_AND_PERIOD = (
     "mass and inertia must be None where the scene has a period, got {got}: an impact would move all of its images"
 )
@@ -32,13 +32,13 @@ WITHOUT_PERIOD = "give it a motion instead of a mass, or leave the period out"
 
 
 def images_of(surface: Surface, period: Lengths, name: str, largest: float = 0.0) -> list[Surface]:
-    """The surface and its images, as far as they reach into the cell; itself where it is the same along the period.
+    """Return the surface and its images that reach into the cell; itself alone if it is the same along the period.
 
     Args:
         surface: as it is given.
-        period: lengths of the cell [m], None where it does not repeat.
+        period: lengths of the cell [m], None along an axis without a period.
         name: of the surface, for the error.
-        largest: the largest radius of a ball [m], which a solid so near to a face meets across it; 0 of points.
+        largest: the largest radius of a ball [m], which a solid this near to a face meets across it; 0 for points.
 
     Raises:
         SceneError: the surface is neither bounded along the period nor the same all along it, it is longer than the
@@ -75,7 +75,7 @@ def images_of(surface: Surface, period: Lengths, name: str, largest: float = 0.0
 
 
 def _require_within(surface: Outlined, period: Lengths, name: str, largest: float) -> None:
-    """Raise a `SceneError` where an outline, or a ball that touches it, reaches over a face of the cell."""
+    """Raise a `SceneError` if an outline, or a ball that touches it, reaches over a face of the cell."""
     low, high = (corner[:, 0] for corner in surface.corners())
     low, high, near = low - largest, high + largest, f" with a ball of a radius of {largest:g} m" * (largest > 0.0)
     for k, length in enumerate(period):
@@ -87,7 +87,7 @@ def _require_within(surface: Outlined, period: Lengths, name: str, largest: floa
 
 
 def _many_images(field: ManyBodies, period: Lengths, name: str, largest: float) -> ManyBodies:
-    """A field with the images of its bodies, as far as they reach into the cell."""
+    """Return a field with the images of its bodies that reach into the cell."""
     low, high = field.corners()
     shifts = [np.zeros((1, 3))]
     for k, length in enumerate(period):
@@ -104,7 +104,7 @@ def _many_images(field: ManyBodies, period: Lengths, name: str, largest: float) 
         steps = np.zeros((last - first + 1, 3))
         steps[:, k] = length * np.arange(first, last + 1)
         shifts.append(steps)
-    # A step along one axis after the other
+    # Shifts along one axis after the other
     every = [np.sum(parts, axis=0) for parts in itertools.product(*shifts)]
     near = np.array([[math.inf if length is None else _NEAR * length + largest] for length in period])
     far = near + np.array([[0.0 if length is None else length] for length in period])
@@ -120,7 +120,7 @@ def _many_images(field: ManyBodies, period: Lengths, name: str, largest: float) 
 def _shifts(
     surface: Surface, ends: tuple[float, float], length: float, name: str, k: int, largest: float
 ) -> list[float]:
-    """The multiples of the period along one axis that bring a bounded surface into the cell."""
+    """Return the multiples of the period along one axis that bring a bounded surface into the cell."""
     low, high = ends
     if not (math.isfinite(low) and math.isfinite(high)):
         raise SceneError(
@@ -146,7 +146,7 @@ def _shifts(
 
 
 def extent_of(surface: Surface) -> Box:
-    """The box that a solid is in, or a cavity."""
+    """Return the box around a solid or a cavity."""
     if isinstance(surface, Mesh):
         return surface.enclosing_box()
     body = replace(surface, side="inside", motion=None) if surface.is_solid() else surface  # type: ignore[call-arg]
@@ -165,7 +165,7 @@ def is_same_along(surface: Surface, k: int, period: Lengths, least: float = _NO_
 
 
 def _require_place(surface: Surface, period: Lengths, name: str) -> None:
-    """Raise a `SceneError` if a surface does not stay where it is along the period, or what it is."""
+    """Raise a `SceneError` if a surface changes its place along the period, or its shape."""
     if surface.reacts() and not _is_same_in_all(surface, period):
         raise SceneError(f"{name}.{MASS_AND_PERIOD.format(got=surface)}; {WITHOUT_PERIOD}")
     for one in parts_of(surface.motion):
@@ -179,7 +179,7 @@ def _require_place(surface: Surface, period: Lengths, name: str) -> None:
 
 
 def _is_same_in_all(surface: Surface, period: Lengths) -> bool:
-    """Whether a wall with a mass stays what it is along the period, wherever it is moved: a lid."""
+    """Whether a wall with a mass is unchanged along the period, wherever it is moved: a lid."""
     ways = [k for k, length in enumerate(period) if length is not None]
     return surface.inertia is None and all(_slides(surface, k, period) for k in ways)
 
@@ -190,7 +190,7 @@ def _moves_along(motion: Any, k: int, surface: Surface, period: Lengths) -> bool
 
 
 def _slides(surface: Surface, k: int, period: Lengths) -> bool:
-    """Whether a surface that goes along an axis stays what it is, as a belt does."""
+    """Whether a surface that moves along an axis is unchanged, as a belt is."""
     return not isinstance(surface, Many) and is_same_along(surface, k, period)
 
 
@@ -210,7 +210,7 @@ def _goes_along(motion: Any, k: int, surface: Surface) -> bool:
 
 
 def lengths_of(period: Any) -> Lengths | None:
-    """The argument `period`, checked; None where no direction repeats."""
+    """Return the argument `period`, checked; None if no axis has a period."""
     if period is None:
         return None
     given = checks.parts_of(period)
@@ -228,7 +228,7 @@ def lengths_of(period: Any) -> Lengths | None:
 
 
 def into_cell(period: Lengths, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Points (3, N) in the cell, each coordinate in [0, L), and how many cells away they were, (3, N)."""
+    """Return points (3, N) in the cell, each coordinate in [0, L), and how many cells away they were, (3, N)."""
     inside = np.array(points).reshape(3, -1)
     image = np.zeros(inside.shape, np.int64)
     for k, length in enumerate(period):
@@ -249,13 +249,13 @@ def into_cell(period: Lengths, points: NDArray[np.float64]) -> tuple[NDArray[np.
 
 
 def cell_of(period: Lengths) -> Box:
-    """Two corners of the cell, infinite where it does not repeat."""
+    """Return two corners of the cell, infinite along an axis without a period."""
     x, y, z = (math.inf if length is None else length for length in period)
     low = [-math.inf if length is None else 0.0 for length in period]
     return (low[0], low[1], low[2]), (x, y, z)
 
 
 def corners_of(period: Lengths) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The same as arrays (3,)."""
+    """Return `cell_of` as arrays (3,)."""
     low, high = cell_of(period)
     return np.array(low), np.array(high)

@@ -1,13 +1,13 @@
-"""A cell that repeats without end: when a flight leaves it, and the way back into it.
+"""A periodic cell: when a flight leaves it, and the way back into it.
 
-Every wall that reaches beyond a face, or close to one, is there a second time, shifted by the period: so the walls of a
-particle in the cell, and a little outside of it, are all in the scene. A flight ends a little beyond the face at the
-latest, so that no round-off decides whether it has left; where no wall that has images is in the way it goes on over
+Every wall that reaches beyond a face, or close to one, has an image, shifted by the period: so the walls of a
+particle in the cell, and a little outside it, are all in the scene. A flight ends a little beyond the face at the
+latest, so that no round-off decides whether it has left; if no wall with images is in the way it continues over
 any number of cells, which are counted at its end.
 
 Along an axis along which every wall is the same a face is no event. Else there are gaps: between two coordinates there
-is no wall that has images, and what flies there, however far along the other axes, meets only walls that are the same
-all along the period. And what flies along an axis and passes all walls of a cell passes those of every cell.
+is no wall with images, and a flight there, however far along the other axes, meets only walls that are the same
+all along the period. And a flight along an axis that passes all walls of a cell passes those of every cell.
 """
 
 import math
@@ -45,16 +45,16 @@ from .images import Lengths, extent_of, is_same_along
 
 # Halvings of the part of a step after which it leaves.
 _HALVINGS = 60
-# Of the period, the room that a gap leaves to the walls beside it, and the narrowest one that is worth a look; among
-# the bodies of fields that is one over several layers of them, for there each look is paid at each cell of the grid.
+# As parts of the period: the distance of a gap from the walls beside it, and the narrowest gap that is used; among
+# the bodies of fields it spans several layers of them, for it is tested at each cell of the grid there.
 _ROOM, _NARROWEST, _AMONG_FIELDS = 1e-3, 1e-2, 0.25
 
 
 class Period(Record):
-    """The cell: its length along each axis [m], None where it does not repeat.
+    """The cell: its length along each axis [m], None along an axis without a period.
 
-    `fall` is the potential energy per mass of one image along each axis, None where gravity pulls along none of them;
-    `gaps` are those in which flights go on over all faces, or None where walls are known in the cell alone.
+    `fall` is the potential energy per mass of one image along each axis, None if gravity pulls along none of them;
+    `gaps` are those in which flights cross all faces, or None if walls are known in the cell alone.
     """
 
     x: Any
@@ -65,14 +65,14 @@ class Period(Record):
 
 
 class Return(Record):
-    """A position in the cell, and by how many images along each axis it has come back."""
+    """A position in the cell, and the number of images along each axis by which it was moved."""
 
     r: Vec
     images: Vec
 
 
 def into(period, r):
-    """The `Return` of a position into the cell."""
+    """Return the `Return` of a position into the cell."""
     if period is None:
         return Return(r, ZERO)
     n = Vec(image_of(period.x, r.x), image_of(period.y, r.y), image_of(period.z, r.z))
@@ -80,7 +80,7 @@ def into(period, r):
 
 
 def moved_into(period, r, other):
-    """A position, moved by as many images as another one is into the cell."""
+    """Return a position, moved by the number of images by which another one is moved into the cell."""
     n = into(period, other).images
     return r - Vec(n.x * length_of(period.x), n.y * length_of(period.y), n.z * length_of(period.z))
 
@@ -102,14 +102,14 @@ def keeps_walls(period, r):
 
 
 def is_beyond(period, r):
-    """Whether a position is farther outside than walls are known."""
+    """Whether a position is farther outside the cell than walls are known."""
     if period is None:
         return False
     return is_beyond_face(period.x, r.x) | is_beyond_face(period.y, r.y) | is_beyond_face(period.z, r.z)
 
 
 def cut(period, gravity, motion, remaining, hit):
-    """The `Hit` of a flight (r, v), or that it leaves the cell before; `remaining` is the time until the frame ends."""
+    """Return the `Hit` of a flight (r, v), or when it leaves the cell before; `remaining` is left of the frame."""
     if period is None:
         return hit
     (r, v), (gx, gy, gz) = motion, pulls(gravity)
@@ -117,8 +117,8 @@ def cut(period, gravity, motion, remaining, hit):
     z = time_to_leave(period.z, r.z, v.z, gz)
     late = EPSILON * remaining
     first, hit = over_faces(period.gaps, period, gravity, motion, (least(x, y, z), hit, 2.0 * late))
-    # What is left of the frame is rounded at each face, the same way each time: 0.1 m after 1e8 faces. So the flight
-    # ends a little later, after a time that leaves exactly what it is rounded to.
+    # The rest of the frame is rounded at each face, the same way each time: 0.1 m after 1e8 faces. So the flight
+    # ends a little later, after a time with an exact rest.
     exact = remaining - (remaining - (first + late))
     room = least(room_along(period.x), room_along(period.y), room_along(period.z))
     short = _fastest(gravity, v, first) * late <= room
@@ -128,15 +128,15 @@ def cut(period, gravity, motion, remaining, hit):
 
 
 def _fastest(gravity, v, t):
-    """The greatest speed along an axis, which is not exceeded within a time t."""
+    """Return the greatest speed along an axis, which is not exceeded within a time t."""
     gx, gy, gz = pulls(gravity)
     return most(fastest(gx, v.x, t), fastest(gy, v.y, t), fastest(gz, v.z, t))
 
 
 def on_time(period, gravity, motion, remaining, time, room):
-    """When a flight (r, v) among bodies ends that is free until `time`, and may go on by `room` along each axis.
+    """Return when a flight (r, v) among bodies ends that is free until `time`, and may end later by `room` along axes.
 
-    Where nothing repeats that is then.
+    Without a period it ends at `time`.
     """
     if period is None:
         return time
@@ -149,7 +149,7 @@ def on_time(period, gravity, motion, remaining, time, room):
 
 
 def part_until(period, step):
-    """The part of a step after which it leaves; `step` is the polynomial r0 + s (a + s (b + s c)) as (r0, a, b, c)."""
+    """Return the part of a step after which it leaves; the step is r0 + s (a + s (b + s c)), given as (r0, a, b, c)."""
     return math.inf if period is None else _part_until(period, step)
 
 
@@ -177,14 +177,14 @@ def _has_gone(period, step, s):
 def cell_in(
     period: Lengths, surfaces: Sequence[Surface], fields: bool, fall: Vec | None, largest: float = 0.0
 ) -> Period:
-    """The cell as kernels take it.
+    """Return the cell as a record for kernels.
 
     Args:
-        period: its lengths [m], None where it does not repeat.
-        surfaces: all of the scene, without their images.
+        period: its lengths [m], None along an axis without a period.
+        surfaces: all surfaces of the scene, without their images.
         fields: whether kernels take some of them as fields, which are known in the cell alone.
         fall: the potential energy per mass of one image along each axis, or None.
-        largest: the largest radius of a ball [m], 0 of points.
+        largest: the largest radius of a ball [m], 0 for points.
     """
     # The places of openings are known in the cell alone.
     if any(piece.openings for one in surfaces for piece in one.surfaces()):
@@ -196,14 +196,14 @@ def cell_in(
 
 
 def _are_same(surfaces: Sequence[Surface], axes: Sequence[int], period: Lengths) -> bool:
-    """Whether surfaces are the same along axes, to the last digit: a flight may go on over 1e12 cells."""
+    """Whether surfaces are the same along axes, to the last digit: a flight may cross 1e12 cells."""
     return all(not isinstance(one, Many) and is_same_along(one, k, period, least=0.0) for one in surfaces for k in axes)
 
 
 def _gaps(
     period: Lengths, surfaces: Sequence[Surface], across: Sequence[int], fields: bool, largest: float
 ) -> Gaps | None:
-    """The gaps along the axes `across`, along which not all walls are the same; None where walls with images move."""
+    """Return the gaps along the axes `across`, along which not all walls are alike; None if walls with images move."""
     repeated = [one for one in surfaces if not _are_same([one], across, period)]
     if any(one.motion is not None for one in repeated):
         return None
@@ -222,7 +222,7 @@ def _gaps(
 
 
 def _corners(surface: Surface) -> tuple[Floats, Floats]:
-    """The corners (3, n) of boxes around what a surface fills, or around each of its bodies."""
+    """Return the corners (3, n) of boxes around the volume of a surface, or around each of its bodies."""
     if isinstance(surface, Many):
         return surface.corners()
     low, high = extent_of(surface)
@@ -230,20 +230,20 @@ def _corners(surface: Surface) -> tuple[Floats, Floats]:
 
 
 def _beside(low: Floats, high: Floats) -> Beside | None:
-    """The places below and above intervals that do not repeat, or None."""
+    """Return the places below and above intervals along an axis without a period, or None."""
     first, last = float(low.min()), float(high.max())
     room = _ROOM * (last - first)
     return Beside(first - room, last + room) if math.isfinite(room) else None
 
 
 def _gap(low: Floats, high: Floats, length: float, least: float) -> Gap | None:
-    """The widest gap between intervals that repeat, or None where that is less than a part of the length."""
+    """Return the widest gap between periodic intervals, or None if it is less than a part of the length."""
     if not (high - low < length).all():
         return None
     begin = low % length
     order = np.argsort(begin)
     begin, end = begin[order], (begin + (high - low))[order]
-    # How far those before each of them reach, once around the period
+    # How far the intervals before each reach, once around the period
     reached = np.maximum.accumulate(np.concatenate([[end.max() - length], end[:-1]]))
     k, room = int(np.argmax(begin - reached)), _ROOM * length
     first, last = float(reached[k]) + room, float(begin[k]) - room

@@ -1,1 +1,1 @@
-"""Where and when a wall is there: openings, doors, rooms and patches."""
+"""Where and when a wall is present: openings, doors, rooms and patches."""

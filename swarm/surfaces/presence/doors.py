@@ -1,8 +1,8 @@
-"""Doors: openings that are open, and walls that are there, between some times only.
+"""Doors: openings that are open, and walls that are present, between given times only.
 
-Kernels do not depend on these times. A run cuts its frames at the instants at which something opens, shuts, comes or
-goes. From one instant to the next a number says of each such wall whether it is there, and an opening that is shut
-opens no wall.
+Kernels do not depend on these times. A run cuts its frames at the instants at which an opening opens or shuts, or a
+wall appears or disappears. From one instant to the next a number says for each such wall whether it is present, and a
+shut opening opens no wall.
 """
 
 import bisect
@@ -22,7 +22,7 @@ from ..frames import Unturned
 from ..time_of_impact.course import Quartic
 from ..time_of_impact.rising import LevelStep
 
-# The distance at which a particle is from a wall that is not there, and the level of such a wall.
+# The distance of a particle from an absent wall, and the level of such a wall.
 _AWAY = -1e150
 
 # Pairs (t0, t1) [s], from t0 on and before t1; None: always.
@@ -30,7 +30,7 @@ Spans = tuple[tuple[float, float], ...] | None
 
 
 def checked_spans(name: str, value: Any) -> Spans:
-    """The pairs of times of a door, checked; None stays None.
+    """Return the pairs of times of a door, checked; None stays None.
 
     >>> checked_spans("times", [(0.0, 2.5), (3, math.inf)])
     ((0.0, 2.5), (3.0, inf))
@@ -56,9 +56,9 @@ def checked_spans(name: str, value: Any) -> Spans:
 def _pair(name: str, value: Any) -> tuple[float, float]:
     try:
         begin, end = (float(part) for part in value)
-    except Exception:  # no pair, no numbers, or an object of others
+    except Exception:  # no pair, no numbers, or an object array
         raise SceneError(f"{name} must be a pair (t0, t1) of seconds, got {checks.shown(value)}") from None
-    if not 0.0 <= begin < end:  # also where one is no number
+    if not 0.0 <= begin < end:  # also if one is NaN
         raise SceneError(
             f"{name} must be from a time of 0 s or more to a later one, got ({begin:g}, {end:g}); a run begins at 0 s, "
             "and the last time may be infinite"
@@ -68,12 +68,12 @@ def _pair(name: str, value: Any) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Opening(Validated):
-    """A volume in which a wall is not there between some times; `openings` of a surface hold them.
+    """A volume in which a wall is absent between given times; `openings` of a surface hold them.
 
     Args:
         surface: the volume, a surface without openings, laws and motion.
-        times: pairs (t0, t1) [s] that ascend, from 0 s on: it is open from t0 on and shut again from t1 on, which is
-            infinite in the last pair if it stays open. None: it is always open, as a surface is by itself.
+        times: pairs (t0, t1) [s] that ascend, from 0 s on: it is open from t0 to t1. In the last pair t1 is
+            infinite if it stays open. None: it is always open, as a surface given as an opening is.
         between: True: only walls between rooms of a `Union` are open in it, so that a door may reach the floor.
 
     Raises:
@@ -102,7 +102,7 @@ def is_there(spans: Spans, time: float) -> bool:
 
 
 def was_there(spans: Spans, moment: float) -> bool:
-    """The same in the frame, or the piece of one, that ends at a moment [s]; at 0 s in the first one."""
+    """Whether the frame, or its piece, that ends at a moment [s] is inside one of the spans; at 0 s the first one."""
     if spans is None or moment <= 0.0:
         return is_there(spans, 0.0)
     k = bisect.bisect_left(spans, (moment, -math.inf)) - 1
@@ -110,11 +110,11 @@ def was_there(spans: Spans, moment: float) -> bool:
 
 
 def instants_of(every: Iterable[Spans]) -> tuple[float, ...]:
-    """The instants after 0 s at which any of some spans begins or ends [s], in order."""
+    """Return the instants after 0 s at which any of the spans begins or ends [s], in order."""
     found: set[float] = set()
     for spans in every:
         begins, ends = ({pair[k] for pair in spans or ()} for k in (0, 1))
-        # Pairs that touch are one.
+        # Pairs that touch are one span.
         found |= begins ^ ends
     return tuple(sorted(time for time in found if 0.0 < time < math.inf))
 
@@ -123,12 +123,12 @@ def instants_of(every: Iterable[Spans]) -> tuple[float, ...]:
 
 
 class Present(Unturned):
-    """A wall, and whether it is there: 1 or 0. One that is not there is far from everywhere, and no flight meets it."""
+    """A wall that is present (1) or absent (0). An absent wall is far from everywhere, and no flight meets it."""
 
     body: Any
     there: float
 
-    # Its safe steps are taken in lanes only where its level is known as a whole.
+    # Lanes take its safe steps only if its level is known as a whole.
     in_steps, has_levels, kept, aims, fall_powers, looked_at = False, False, 0, False, 0, False
 
     def _if_there(self, value, other):
@@ -164,7 +164,7 @@ class Present(Unturned):
     def course(self, r, v, pull):
         level, there = self.body.course(r, v, pull), select(self.there > 0.0, 1.0, 0.0)
         b, a2, a3, a4 = (there * one for one in level[1:5])
-        # One that is not there has the level -1 for ever.
+        # An absent wall has the constant level -1.
         return Quartic(self._if_there(level.c, -1.0), b, a2, a3, a4, self._if_there(level.window, math.inf))
 
     steps = Smooth.steps
@@ -177,7 +177,7 @@ class Present(Unturned):
 
 
 class Ajar(Present):
-    """A wall over a step, and whether it stands: 1, or 0 where it is open to the particle at the start of the step."""
+    """A wall over a step that is present (1), or absent (0) if it is open to the particle at the start of the step."""
 
     def displacement(self):
         return self.body.displacement()
@@ -197,18 +197,18 @@ class Faced(Record):
     """The walls of a scene as one step of a particle meets them."""
 
     walls: Any
-    stand: tuple[Any, ...]  # of each wall 1, or 0 where it is open
+    stand: tuple[Any, ...]  # for each wall 1, or 0 if it is open
 
     def length(self):
-        """The number of rows, as that of the walls."""
+        """Return the number of rows, as for the walls."""
         return self.walls.length()
 
     def at(self, remaining):
-        """The walls when so much of the frame is left [s]."""
+        """Return the walls when `remaining` is left of the frame [s]."""
         return self._of(self.walls.at(remaining))
 
     def during(self, remaining, after):
-        """The walls over a step; at its start and end so much of the frame is left [s]."""
+        """Return the walls over a step; at its start `remaining` is left of the frame [s], at its end `after`."""
         return self._of(self.walls.during(remaining, after))
 
     def _of(self, now):
@@ -216,9 +216,9 @@ class Faced(Record):
 
 
 def walls_then(surface: Any, moment: float, largest: float | None = None) -> tuple[Any, ...]:
-    """The walls of a surface as kernels take them in the frame, or the piece of one, that ends at a moment [s].
+    """Return the walls of a surface for kernels in the frame, or the piece of one, that ends at a moment [s].
 
-    Of points, or of balls of this radius at most [m].
+    They are for points, or for balls up to this radius [m].
     """
     walls: tuple[Any, ...] = surface.walls() if largest is None else surface.walls_of_balls(largest)
     if surface.present is None:

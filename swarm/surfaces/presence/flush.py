@@ -1,8 +1,8 @@
 """Flat faces of two surfaces in one plane: surfaces on the same side of it, and solids that stand flush on walls.
 
 A solid that only touches a wall leaves a gap of no width, into which round-off leads points. So a face of a solid that
-lies wholly on other walls is moved a small distance, the *reach*, into the region that these keep from particles.
-`seams` does the same with the common faces of rooms. The region of the particles does not change.
+lies wholly on other walls is moved a small distance, the *reach*, into the region from which these keep particles.
+`seams` does the same for the common faces of rooms. The region of the particles does not change.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -18,9 +18,9 @@ from ..instant import are_there_together, distances, side_of
 from ..surface import Surface
 from .seams import ENOUGH, FAR, OUTSIDE, PLACES, Face, faces_of
 
-# The reach, as a part of the size of the scene: more than `DIGITS` resolve, and than what counts as touching a wall.
+# The reach, as a part of the size of the scene: more than `DIGITS` resolve, and more than the distance of contact.
 _REACH = 2e-9
-# A field of more bodies is left as it is: each body that stands on a wall takes some milliseconds.
+# A field of more bodies is left unchanged: each body that stands on a wall takes some milliseconds.
 MOST_BODIES = 200
 
 
@@ -33,7 +33,7 @@ class OneBody(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """Two flat faces in one plane: the numbers of their surfaces, and those of the faces of each."""
+    """Two flat faces in one plane: the numbers of their surfaces, and the numbers of the faces in these."""
 
     surfaces: tuple[int, int]
     faces: tuple[int, int]
@@ -46,8 +46,8 @@ def pairs_in_one_place(
     """Flat faces of two surfaces that move as one, with a place in common.
 
     Args:
-        surfaces: of a scene.
-        size: their size [m].
+        surfaces: the surfaces of a scene.
+        size: the size of the scene [m].
         matters: whether a pair is wanted, given both surfaces and whether their faces are back to back.
     """
     each = [_planes(one) for one in surfaces]
@@ -71,7 +71,7 @@ def pairs_in_one_place(
 
 
 def _planes(surface: Surface) -> Floats:
-    """The planes of its flat faces, as rows of unit normals out of its admissible side, and offsets (n, 4) [m].
+    """Return the planes of its flat faces, as rows of unit normals out of its admissible side, and offsets (n, 4) [m].
 
     A face that is not flat has a row of NaN.
     """
@@ -82,7 +82,7 @@ def _planes(surface: Surface) -> Floats:
 
 
 def face_of(surface: Surface, number: int) -> Face:
-    """A face by its number among the planes of a surface."""
+    """Return a face by its number among the planes of a surface."""
     if not len(flat := surface.flat_faces()):
         return faces_of(surface)[number]
     side = side_of(surface)
@@ -98,7 +98,7 @@ def face_of(surface: Surface, number: int) -> Face:
 
 
 def flush_faces(surfaces: Sequence[Surface]) -> dict[tuple[int, int], float]:
-    """The faces of solids, (surface, face), that lie within other walls, and how far each is to be moved out [m]."""
+    """Return the faces of solids, (surface, face), that lie within other walls, and how far to move each out [m]."""
     size = max((surface.extent() for surface in surfaces), default=0.0) or 1.0
     mates = dict[tuple[int, int], list[tuple[int, int]]]()
     for pair in pairs_in_one_place(surfaces, size, _closes):
@@ -116,7 +116,7 @@ def flush_faces(surfaces: Sequence[Surface]) -> dict[tuple[int, int], float]:
 
 
 def bodies_of(surfaces: Sequence[Surface]) -> Iterator[OneBody]:
-    """The surfaces, of fields the first bodies."""
+    """Yield the surfaces, and for fields the first bodies."""
     for i, surface in enumerate(surfaces):
         if not isinstance(surface, ManyBodies) or not surface.body_count() or surface.is_foam():
             yield OneBody(i, None, surface)
@@ -127,7 +127,7 @@ def bodies_of(surfaces: Sequence[Surface]) -> Iterator[OneBody]:
 
 
 def first_bodies(surfaces: Sequence[Surface]) -> list[OneBody]:
-    """As `bodies_of`, with so many at most that are listed, and as many of fields: a field hides no wall after it."""
+    """As `bodies_of`, with at most `MOST_BODIES` surfaces and bodies of fields each: a field hides no wall after it."""
     left = {True: MOST_BODIES, False: MOST_BODIES}
     found = []
     for one in bodies_of(surfaces):
@@ -138,12 +138,12 @@ def first_bodies(surfaces: Sequence[Surface]) -> list[OneBody]:
 
 
 def may_reach(one: OneBody, surfaces: Sequence[Surface]) -> bool:
-    """Whether it is made to reach into a wall on which it stands."""
+    """Whether a body is extended into a wall on which it stands."""
     return one.row is None or surfaces[one.surface].body_count() <= MOST_BODIES
 
 
 def extended(surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
-    """The surfaces of a scene, with solids that reach into the walls on which they stand."""
+    """Return the surfaces of a scene, with solids that reach into the walls on which they stand."""
     made, longer = list(surfaces), dict[int, Surface]()
     looked_at = [one for one in bodies_of(surfaces) if may_reach(one, surfaces)]
     for (k, a), by in flush_faces([one.body for one in looked_at]).items():
@@ -170,12 +170,12 @@ def _closes(one: Surface, other: Surface, are_back_to_back: bool) -> bool:
 
 
 def _keeps(wall: Surface, solid: Surface) -> bool:
-    """Whether a wall is there whenever a solid is."""
+    """Whether a wall is present whenever a solid is."""
     return solid.is_solid() and not (wall.reacts() or solid.reacts()) and wall.present in (None, solid.present)
 
 
 def _apart(face: Face, mate: Face) -> float:
-    """The width of the gap between two faces in one plane [m]."""
+    """Return the width of the gap between two faces in one plane [m]."""
     assert face.plane is not None
     assert mate.plane is not None
     return -(face.plane[1] + mate.plane[1])
@@ -198,7 +198,7 @@ def _is_within(solid: Surface, number: int, others: Sequence[Surface], size: flo
 
 
 def _places_of(solid: Surface, number: int, size: float, random: np.random.Generator) -> tuple[Floats, Floats]:
-    """Points (3, N) in the plane of a face of a solid, among which are some on the face, and points on its rim."""
+    """Return points (3, N) in the plane of a face of a solid, some of them on the face, and points on its rim."""
     if (known := solid.places_of_flat_face(number, PLACES)) is not None:
         return known
     low, high = (np.clip(corner, -size, size)[:, None] for corner in solid.at_rest().filled().bounds())
@@ -209,7 +209,7 @@ def _places_of(solid: Surface, number: int, size: float, random: np.random.Gener
 
 
 def _depths(walls: Sequence[Surface], points: Floats) -> Floats:
-    """The largest distance of points (3, N) out of the admissible side of any of these walls [m]."""
+    """Return the largest distance of points (3, N) out of the admissible side of any of these walls [m]."""
     with np.errstate(all="ignore"):
         return np.asarray(np.max([side_of(one) * distances(one, points) for one in walls], axis=0))
 

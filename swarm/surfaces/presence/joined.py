@@ -14,23 +14,23 @@ from ..walls import Walls
 
 # The slack of rooms, as a part of the extent of their union.
 _SLACK = 1e-13
-# Where rooms touch, a particle that meets a wall is put so many times the slack inside of it.
+# Where rooms touch, a particle that meets a wall is placed this multiple of the slack inside it.
 _INSET = 3.0
-# A place is on a wall up to this distance from it, relative to the extent. Two walls touch if so many of the places on
-# one are on the other.
+# A place is on a wall up to this distance from it, relative to the extent. Two walls touch if this number of places on
+# one wall are on the other one.
 _TOUCHES, _SOME = 1e-12, 3
-# Places at which it is asked how steep a level is, and moves of each onto its wall.
+# The places at which the steepness of a level is evaluated, and the moves of each onto its wall.
 _PLACES, _MOVES = 64, 4
 
 
 def with_rooms(walls: Walls, unions: Sequence[Sequence[Sequence[Surface]]]) -> Walls:
-    """The walls of a scene of which the last are those of unions: of each its rooms, and of these the surfaces."""
+    """Return the walls of a scene, of which the last are those of unions, with rooms; `unions` gives their surfaces."""
     if not unions:
         return walls
     gentle = tuple(tuple(tuple(g for one in room for g in _gentle(one)) for room in rooms) for rooms in unions)
     extent = max(surface.extent() for rooms in unions for room in rooms for surface in room)
     if isinstance(walls, Strided):
-        # Lanes take the safe steps of walls that hold every particle.
+        # Lanes take safe steps only to walls that hold every particle.
         walls = Marched(*walls)
     slack = _SLACK * (extent or 1.0)
     touch = any(_wall_between(*pair) for rooms in unions for pair in itertools.combinations(rooms, 2))
@@ -57,7 +57,7 @@ def _wall_between(one: Sequence[Surface], other: Sequence[Surface]) -> bool:
 
 
 def _places_on(wall: Any, extent: float) -> Any:
-    """Places on a wall (3, N)."""
+    """Return places on a wall (3, N)."""
     places = (extent or 1.0) * np.random.default_rng(0).uniform(-1.0, 1.0, (3, _PLACES))
     with np.errstate(all="ignore"):
         for _move in range(_MOVES):
@@ -67,7 +67,7 @@ def _places_on(wall: Any, extent: float) -> Any:
 
 
 def _gentle(surface: Surface) -> list[float]:
-    """1/the steepness of the level of each wall of a surface, at its steepest place."""
+    """Return 1/the steepness of the level of each wall of a surface, at its steepest place."""
     found = []
     with np.errstate(all="ignore"):
         for wall in surface.walls():

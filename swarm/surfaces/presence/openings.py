@@ -1,7 +1,7 @@
-"""Openings: volumes inside which a wall is not there. A particle that reaches the wall there has passed.
+"""Openings: volumes inside which a wall is absent. A particle that reaches the wall there has passed.
 
-A volume is where a particle would be admissible among the walls of the surface that gives it; of many bodies (`Spheres`
-and the like) it is the inside of each.
+A volume is where a particle would be admissible among the walls of the surface that describes it; for many bodies
+(`Spheres` and the like) it is the inside of each.
 """
 
 import itertools
@@ -31,26 +31,26 @@ from .absence import OPEN, Absence
 from .doors import is_there, was_there
 from .rooms import leads_on
 
-# Most walls that all openings of a scene may be compiled for.
+# The most walls that all openings of a scene may be compiled for.
 _MOST = 24
-# Places of a wall at which a counter is looked for in an opening, and Newton's steps onto the wall for each.
+# Places of a wall that are searched for one near to a counter in an opening, and Newton's steps of each onto the wall.
 _PLACES, _NEWTON = 4096, 8
-# A volume without end is searched as far as this many times the larger extent, of the wall or of the volume.
+# An unbounded volume is searched up to this multiple of the larger extent, of the wall or of the volume.
 _REACH = 2.0
 
 
 class Opened(Absence):
-    """The volumes in which some walls are open."""
+    """The volumes in which walls are open."""
 
     volumes: tuple[Any, ...]  # each `Walls` or a `Field`
     first: float  # the number of the first of these walls
-    last: float  # that of the first after them; `first` while the volumes are shut: they open no wall then
+    last: float  # of the first wall after them; `first` while the volumes are shut: they open no wall then
 
     def is_of(self, wall):
-        """Whether a wall is one of these."""
+        """Whether a wall is opened by these volumes."""
         return (wall >= self.first) & (wall < self.last)
 
-    # Whether they are open only where another room of their union is on the other side.
+    # Whether the walls are open only where another room of their union is on the other side.
     between = False
 
     def takes(self, walls, wall, r, near, depth):
@@ -70,10 +70,10 @@ class Doorway(Opened):
 def openings_in(
     spans: Sequence[tuple[int, int]], given: Sequence[Sequence[Sequence[Surface]]], moment: float
 ) -> tuple[Opened, ...]:
-    """The openings of the walls of a scene as kernels take them.
+    """Return the openings of the walls of a scene as records for kernels.
 
-    `spans` are (piece, walls in a row that are of it), `given` the volumes in which each piece is open, and those in
-    which it is open where another room is behind it; they are those of the frame, or the piece of one, that ends at a
+    `spans` are (piece, number of consecutive walls of it); `given` are the volumes in which each piece is open, and the
+    volumes in which it is open where another room is behind it, in the frame, or the piece of one, that ends at a
     moment [s].
     """
     made = _rows(spans, given, moment, False)
@@ -81,7 +81,7 @@ def openings_in(
 
 
 def compiled(openings: Sequence[Opened]) -> int:
-    """The number of walls of volumes that kernels are compiled for: one for a field, and once for walls in a row."""
+    """Return the number of walls of volumes in kernels: one for a field, and once for consecutive walls."""
     volumes = (one for opened in openings for one in opened.volumes)
     return sum(1 if isinstance(one, Field) else len(one.each) for one in volumes)
 
@@ -89,7 +89,7 @@ def compiled(openings: Sequence[Opened]) -> int:
 def _rows(
     spans: Sequence[tuple[int, int]], given: Sequence[Sequence[Sequence[Surface]]], moment: float, together: bool
 ) -> tuple[Opened, ...]:
-    """The openings, those of one kind that are open at the same times together.
+    """Return the openings; openings of one kind that are open at the same times are one.
 
     Volumes of one kind are one field if they are taken `together`.
     """
@@ -107,7 +107,7 @@ def _rows(
 
 
 def volumes_in(volumes: Sequence[Surface], together: bool = False) -> tuple[Any, ...]:
-    """Volumes as kernels take them; with `together`, several of one kind are a field."""
+    """Return volumes as records for kernels; with `together`, several of one kind are a field."""
     fields, rest = _fields_of(volumes) if together else ([], volumes)
     alone = reversed(by_kind(rest, lambda volume: volume.walls()))
     return (
@@ -117,7 +117,7 @@ def volumes_in(volumes: Sequence[Surface], together: bool = False) -> tuple[Any,
 
 
 def _fields_of(volumes: Sequence[Surface]) -> tuple[list[Members], list[Surface]]:
-    """Several volumes of one kind as the insides of the solids of a field each, and the others."""
+    """Return several volumes of one kind as the insides of the solids of a field each, and the other volumes."""
     found: dict[Any, list[Surface]] = defaultdict(list)
     rest = []
     for one in volumes:
@@ -131,10 +131,10 @@ def _fields_of(volumes: Sequence[Surface]) -> tuple[list[Members], list[Surface]
 
 
 def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Surface, ...]:
-    """The open parts of a surface: those its openings say and, where the scene repeats, the images of that.
+    """Return the open volumes of a surface: those of its openings and, in a periodic scene, their images.
 
     Raises:
-        SceneError: an opening has no phi, or no point of the wall in it, or it does not go with the period.
+        SceneError: an opening has no phi, or no point of the wall in it, or it does not fit the period.
     """
     found: list[Surface] = []
     for k, opening in enumerate(surface.open_volumes()):
@@ -150,17 +150,17 @@ def volumes_of(surface: Surface, period: Lengths | None, name: str) -> tuple[Sur
 
 
 def volumes_of_counter(volume: Surface, period: Lengths | None, name: str) -> tuple[Surface, ...]:
-    """The volume in which a counter counts and, where the scene repeats, the images of that.
+    """Return the volume in which a counter counts and, in a periodic scene, its images.
 
     Raises:
-        SceneError: it has no phi that is known everywhere, or it does not go with the period.
+        SceneError: it has no phi that is known everywhere, or it does not fit the period.
     """
     _require_volume(volume, name)
     return (volume,) if period is None else tuple(_images(volume, period, name))
 
 
 def _require_volume(volume: Surface, name: str) -> None:
-    """Raise a `SceneError` where a surface has no phi that is known everywhere."""
+    """Raise a `SceneError` if a surface has no phi that is known everywhere."""
     if isinstance(volume, Outlined):
         raise SceneError(
             f"{name} must be a volume of surfaces such as swarm.Box, got {type(volume).__name__}; give a box or a "
@@ -170,7 +170,7 @@ def _require_volume(volume: Surface, name: str) -> None:
 
 
 def _images(opening: Surface, period: Lengths, name: str) -> list[Surface]:
-    """The volume in every cell, as far as it reaches into this one."""
+    """Return the images of a volume that reach into the cell."""
     side = getattr(opening, "side", None)
     if isinstance(opening, Many) or side is None:
         return images_of(opening, period, name)
@@ -179,13 +179,13 @@ def _images(opening: Surface, period: Lengths, name: str) -> list[Surface]:
             f'{name}.side must be "inside" where the scene has a period, got "outside": the images of what is open '
             "would cover one another's walls"
         )
-    # The images of a solid are those of what it fills.
+    # The images of a solid are those of its volume.
     solid = replace(opening, side="outside")  # type: ignore[call-arg]
     return [replace(image, side="inside") for image in images_of(solid, period, name)]  # type: ignore[call-arg]
 
 
 def require_few(openings: Sequence[Opened]) -> None:
-    """Raise a `SceneError` where there are more openings than kernels can be compiled for."""
+    """Raise a `SceneError` if there are more openings than kernels can be compiled for."""
     walls = compiled(openings)
     if walls > _MOST:
         volumes = sum(len(opened.volumes) for opened in openings)
@@ -213,11 +213,11 @@ def reaches(surface: Surface, opening: Surface) -> bool:
 
 
 def least_distance(surface: Surface, volumes: Sequence[Surface], other: Surface) -> float:
-    """How near a surface comes to the part of a wall that an opening cuts out.
+    """Return how near a surface comes to the part of a wall that an opening cuts out.
 
     Args:
         surface: the wall.
-        volumes: an opening of it, and others: only places in all of them count.
+        volumes: an opening of it, and other volumes: only places in all of them count.
         other: the surface, such as a counter.
 
     Returns:
@@ -225,7 +225,7 @@ def least_distance(surface: Surface, volumes: Sequence[Surface], other: Surface)
     """
     low, high = _box_around(surface, volumes[0])
     points = low + (high - low) * np.random.default_rng(0).random((3, _PLACES))
-    # From where phi has no gradient a step leads nowhere, and no volume has such a place.
+    # From a place where phi has no gradient a step leads nowhere, and no volume has such a place.
     with np.errstate(all="ignore"):
         for _ in range(_NEWTON):
             slopes = surface.gradient(points)
@@ -235,10 +235,10 @@ def least_distance(surface: Surface, volumes: Sequence[Surface], other: Surface)
 
 
 def _box_around(surface: Surface, opening: Surface) -> Any:
-    """The corners of the box of an opening (3, 1) [m], as far as it is of use at its wall."""
+    """Return the corners of the box of an opening (3, 1) [m], limited to the surroundings of its wall."""
     reach = _REACH * max(surface.extent(), opening.extent())
     low, high = (np.array(corner)[:, None] for corner in _box_of(opening))
-    # Also where the box of a flat volume has no width
+    # A margin, also for a flat volume with a box of no width
     room = 1e-9 * reach
     return np.maximum(low - room, -reach), np.minimum(high + room, reach)
 
@@ -251,7 +251,7 @@ def _box_of(opening: Surface) -> Any:
 
 
 def are_open(volumes: Sequence[Surface], points: NDArray[np.float64], time: float) -> NDArray[np.bool_]:
-    """Which of the points (3, N) are in any of the volumes that are open at a time [s]."""
+    """Whether each of the points (3, N) is in any of the volumes that are open at a time [s]."""
     found = np.zeros(points.shape[1], np.bool_)
     for volume in volumes:
         if is_there(volume.present, time):
@@ -263,9 +263,9 @@ def are_open(volumes: Sequence[Surface], points: NDArray[np.float64], time: floa
 
 
 def outside(volume, r):
-    """Signed distance outside of a volume, to first order: above 0 there, and NaN where that has no value.
+    """Return the signed distance outside a volume, to first order: above 0 outside, and NaN where it has no value.
 
-    What is neither `Walls` nor a `Field` is the inside of one body of a field; its admissible side is the outside.
+    A volume that is neither `Walls` nor a `Field` is the inside of one body of a field; the outside is admissible.
     """
     if isinstance(volume, Field):
         return -volume.members.deepest_in_cell(r)
@@ -279,7 +279,7 @@ def outside(volume, r):
 
 
 def _is_deep_in(volumes, r, near, depth):
-    """Whether a place is deeper in any of some volumes than so many times `near`."""
+    """Whether a place is deeper in any of the volumes than `depth` times `near`."""
     found = False
     for volume in reversed(volumes):
         found = (outside(volume, r) <= -depth * near) | found
@@ -287,14 +287,14 @@ def _is_deep_in(volumes, r, near, depth):
 
 
 def is_in_any(volumes, r):
-    """Whether a place is in any of some volumes."""
+    """Whether a place is in any of the volumes."""
     return _is_deep_in(volumes, r, 0.0, OPEN)
 
 
 def is_open(openings, wall, r, near):
-    """Whether a place on this wall is in an opening of it, or nearer to one than that; False for no wall, which is -1.
+    """Whether a place on this wall is in an opening of it, or within `near` of one; False for no wall, which is -1.
 
-    Where another room has to be on the other side it is not asked whether one is.
+    An opening between rooms counts without the test that another room is on the other side.
     """
     found = False
     for opening in reversed(openings or ()):

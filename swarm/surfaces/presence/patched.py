@@ -1,8 +1,8 @@
-"""Boundaries of patches: fields of walls each of which is there on a part of itself only, as the facets of a mesh.
+"""Boundaries of patches: fields of walls each of which is present on a part of itself only, as the facets of a mesh.
 
-A field of `Patched` members is flown to as any field: `field_hit` gives the first hit that is on a patch. What slides
-on a wall of it goes on, where its patch ends, on the wall that `wall_after` says, or flies. What has no edges but the
-re-entrant ones between parts is a union, rooms.py.
+A flight to a field of `Patched` members is as to any field: `field_hit` returns the first hit on a patch. A particle
+that slides on a wall of it passes, where the patch ends, to the wall that `wall_after` returns, or flies. A solid
+with only the re-entrant edges between parts is a union, rooms.py.
 """
 
 from typing import Any
@@ -12,33 +12,33 @@ from .absence import Absence
 
 
 class Patched(Record):
-    """What a field gives of its walls where each is there on its patch only. See also `fields.members.Members`.
+    """The methods of a field with walls each of which is present on its patch only. See also `fields.members.Members`.
 
-    `list_in_cell` and its like name the walls with a patch that may be near a point. What slides on another wall
-    meets one by `crossing.arrival`, which asks whether it `is_there`.
+    `list_in_cell` and the like list the walls with a patch that may be near a point. A particle that slides on another
+    wall meets one by `crossing.arrival`, which calls `is_there`.
     """
 
     def is_there(self, number, r, near):
-        """Whether the patch of a wall reaches to a place on it, or nearer to it than `near`."""
+        """Whether the patch of a wall reaches to within `near` of a place on it."""
         raise NotImplementedError
 
     def whole(self, number):
-        """A wall without its edges."""
+        """Return a wall without its edges."""
         return self.wall(number)  # type: ignore[attr-defined]
 
     def is_ahead(self, number, start, end, near):
-        """Whether what goes from one place to another may come through the patch of a wall.
+        """Whether a move between two places may come through the patch of a wall.
 
-        No place on its way is farther from the end than `near`.
+        No place on the way is farther from the end than `near`.
         """
         return True
 
     def wall_after(self, number, r, near):
-        """The wall on which what slides on this one goes on beyond the end of its patch at r; -1: it flies."""
+        """Return the wall to which a particle that slides on this one passes at the end of its patch; -1: it flies."""
         return -1.0
 
     def goes_on(self, number, other):
-        """Whether another wall joins this one smoothly where it ends: what slides on this one does not meet it."""
+        """Whether another wall continues this one smoothly: a particle that slides on this one does not meet it."""
         return False
 
 

@@ -1,10 +1,10 @@
 """Unions among the walls of a scene: each a union of rooms, and a room the intersection of the sides of its walls.
 
 A particle is in every room that contains it to within a small distance, `Walls.slack`. Its flight leaves a union where
-it leaves the last of these rooms. If it is inside of another room there, by a few times that distance, it goes on in
+it leaves the last of these rooms. If it is inside another room there, by a few times that distance, it continues in
 the next pass. So rooms that touch without overlapping stay apart, and no round-off lets a particle out at an edge.
 
-The functions take the rooms of a union as `Walls.joined` gives them: for each room its walls, as (number, wall, 1/the
+The functions take the rooms of a union in the form of `Walls.joined`: for each room its walls, as (number, wall, 1/the
 steepness of its level).
 """
 
@@ -16,25 +16,25 @@ from ...kernel.jit import select
 from ...kernel.vector import square
 from .absence import BEYOND, FLIES, Absence, lie_on_each_other
 
-# A flight goes on in another room if it is inside of that by more than so many times the slack.
+# A flight continues in another room if it is inside it by more than this multiple of the slack.
 _INSIDE = 4.0
-# In unions of at most so many walls a flight goes through several rooms in one pass. For two balls an impact then takes
-# 6.1 ns, in place of 6.7; but for a box, a tube and a box, with eight walls and few doorways, 18 in place of 14.
+# In unions of up to this number of walls a flight crosses several rooms in one pass. For two balls an impact then takes
+# 6.1 ns, in place of 6.7. For a box, a tube and a box, with eight walls and few doorways, it is 18 in place of 14.
 _AT_ONCE = 4
-# A particle that passes an open wall goes on from so many times the slack behind it: there it is in one room alone.
+# A particle that passes an open wall continues from this multiple of the slack behind it, where it is in one room.
 _THROUGH = 2.0
-# Walls nearer than so many times the slack touch a particle. A room that does not hold it counts as one with so many
-# of them, more than any room has.
+# Walls nearer than this multiple of the slack touch a particle. A room that does not hold it counts as one with the
+# second number of walls, more than any room has.
 _TOUCH, _OUT = 1024.0, 1e6
 
 
 def gaps_in(rooms, r, t=0.0):
-    """About how far a point is outside of each room after a time [s]: lengths [m], below 0 inside."""
+    """Return about how far a point is outside each room after a time [s]: lengths [m], below 0 inside."""
     return tuple(gap_in(room, r, t) for room in rooms)
 
 
 def gap_in(room, r, t=0.0):
-    """About how far a point is outside of one room after a time [s] [m]."""
+    """Return about how far a point is outside one room after a time [s] [m]."""
     farthest = -math.inf
     for _number, wall, gentle in reversed(room):
         then = wall.later(t)
@@ -44,7 +44,7 @@ def gap_in(room, r, t=0.0):
 
 
 def least_of(gaps):
-    """The least of some gaps."""
+    """Return the least of some gaps."""
     least = math.inf
     for gap in reversed(gaps):
         least = select(gap <= least, gap, least)
@@ -52,7 +52,7 @@ def least_of(gaps):
 
 
 def held_by(walls, gaps):
-    """Which rooms contain a point with these gaps: at least the nearest one."""
+    """Return which rooms contain a point with these gaps: at least the nearest one."""
     held: Any = ()
     least, nearest = least_of(gaps), False
     for gap in gaps:
@@ -65,12 +65,12 @@ def held_by(walls, gaps):
 
 
 def is_inside(walls, gap):
-    """Whether a flight goes on in a room, by its gap there."""
+    """Whether a flight continues in a room, by its gap there."""
     return gap < -_INSIDE * walls.slack
 
 
 def is_inside_any(walls, gaps):
-    """Whether a flight goes on in a room, by its gaps there."""
+    """Whether a flight continues in any room, by its gaps there."""
     found = False
     for gap in reversed(gaps):
         found = is_inside(walls, gap) | found
@@ -78,10 +78,10 @@ def is_inside_any(walls, gaps):
 
 
 def leaving(walls, rooms, leaves, gravity, flight, stops):
-    """When a flight (r, v) leaves a union: (time, wall or -1).
+    """Return when a flight (r, v) leaves a union: (time, wall or -1).
 
     `leaves` has for each room (the time at which the flight leaves it, the wall, or -1 if it surely stays inside until
-    then). Where the flight goes on in another room the wall is -1, unless it `stops`.
+    then). If the flight continues in another room the wall is -1, unless it `stops`.
     """
     r, v = flight
     held = held_by(walls, gaps_in(rooms, r))
@@ -110,9 +110,9 @@ def _leaves_once(room):
 
 
 def _through(walls, rooms, leaves, exits, flight, left):
-    """When a flight (r, v) that leaves a room leaves the other rooms there: (time, wall).
+    """Return when a flight (r, v) that leaves a room leaves the other rooms there: (time, wall).
 
-    The times of walls that are left once are known. Where none of these is later, the flight goes on in the next pass.
+    The times of walls that are left once are known. If none of these is later, the flight continues in the next pass.
     """
     (r, v), (time, wall) = flight, left
     last, number, inside = time, wall, False
@@ -126,20 +126,20 @@ def _through(walls, rooms, leaves, exits, flight, left):
 
 
 def at_the_end(walls, gravity, v, remaining, hit):
-    """The `Hit`, at the end of the frame if it is later by round-off: no particle ends beyond a wall it touches."""
+    """Return the `Hit`, at the end of the frame if later by round-off: no particle ends beyond a wall it touches."""
     late, w = hit.time - remaining, accelerated(gravity, v, remaining)
     soon = (hit.wall >= 0.0) & (late > 0.0) & (late * late * square(w) <= walls.slack * walls.slack)
     return hit._replace(time=select(soon, remaining, hit.time))
 
 
 def inside_of(walls, number, r):
-    """The place r, moved a little inside of the wall with this number if that is the wall of a room."""
+    """Return the place r, moved a little inside the wall with this number if it is the wall of a room."""
     is_of_room = number >= walls.joined()[0][0][0][0]
     return r - select(is_of_room, walls.inset, 0.0) * walls.unit_normal(number, r)
 
 
 def owner_of(walls, rooms, r):
-    """The number of the room that gives the walls near a point: with the fewest walls there, then the deepest."""
+    """Return the number of the room of the walls near a point: with the fewest walls there, then the deepest."""
     owner, fewest, deepest = 0, math.inf, math.inf
     for k, room in enumerate(rooms):
         gap, touching = gap_in(room, r), 0.0
@@ -160,10 +160,10 @@ def owner_of(walls, rooms, r):
 
 
 class Rooms(Absence):
-    """The rooms of a union: a wall is absent in another room, and outside of its own.
+    """The rooms of a union: a wall is absent in another room, and outside its own.
 
-    Edges between rooms are re-entrant: a particle that slides from one room into another flies on there. Where walls of
-    two rooms lie on each other, as the floors of two boxes side by side, it slides on along the wall of the other room.
+    Edges between rooms are re-entrant: a particle that slides from one room into another flies there. Where walls of
+    two rooms lie on each other, as the floors of two boxes side by side, it continues along the wall of the other room.
     """
 
     rooms: Any
@@ -184,7 +184,7 @@ class Rooms(Absence):
         return found
 
     def wall_after(self, walls, wall, r, near):
-        """A wall of another room that lies on this one, where the particle is inside of no other room."""
+        """Return a wall of another room that lies on this one, if the particle is inside no other room."""
         found, flies = -1.0, False
         for room in self.rooms:
             if not is_of_room(room, wall):
@@ -202,12 +202,12 @@ def is_of_room(room, wall):
 
 
 def depth_behind(walls):
-    """How deep inside of the next room particles go on after they pass an open wall [m]."""
+    """Return how deep inside the next room particles continue after they pass an open wall [m]."""
     return _THROUGH * walls.slack if walls.inset is None else walls.inset
 
 
 def other_side(walls, wall, r):
-    """The place on the other side of a wall, from a place on it."""
+    """Return the place on the other side of a wall, from a place on it."""
     return walls.project(wall, r) + depth_behind(walls) * walls.unit_normal(wall, r)
 
 

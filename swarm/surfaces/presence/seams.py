@@ -1,8 +1,8 @@
-"""Faces that two rooms of a union have in common, seen from both sides: there the rooms are one.
+"""Faces that two rooms of a union have in common, seen from both sides: the rooms are one there.
 
-Kernels let a flight go on where rooms overlap. So the face of a room that lies within that of the other one is moved
-into the other room by a small distance, the *reach*: what the union fills does not change. Where neither face lies
-within the other one, a room is added, of what both have in common with their faces moved: it is within the two.
+Kernels let a flight continue where rooms overlap. So the face of a room that lies within that of the other one is moved
+into the other room by a small distance, the *reach*: the volume of the union does not change. Where neither face lies
+within the other one, a room is added, the common part of both with their faces moved: it is within the two.
 """
 
 import itertools
@@ -30,17 +30,17 @@ from ..shapes.torus import Torus
 from ..surface import Surface, volume_of
 from .doors import Opening
 
-# So many roundings of its size apart faces are one.
+# Faces up to this multiple of the round-off of the size apart are one.
 _ROUNDINGS = 4.0 * np.finfo(np.float64).eps
 # A room is at a face if it is at this distance beside it, a part of the size, deeper than by this part of the distance.
 _BESIDE, _WITHIN = 1e-7, 0.5
-# The reach by which it is asked whether a face lies within another one, and how far outside of that it may be then.
+# The reach for the test whether a face lies within another one, and how far outside that face it may then be.
 FAR, OUTSIDE = 1e-6, 1e-9
-# A room without end is searched as far as this many times the size.
+# An unbounded room is searched up to this multiple of the size.
 _REACH = 2.0
 # Places that are tried, moves of each, and how far each move aims.
 PLACES, _MOVES, _PAST = 512, 24, 1.05
-# Places that a room gains: so many are tried, and fewer are not enough to say where it gains them.
+# Places that a room gains: the number of trials, and the least number that shows where it gains them.
 _MANY, ENOUGH = 4096, 8
 # Two round faces are one where the cosine of their normals is -1 up to this.
 _OPPOSITE = 1e-9
@@ -52,7 +52,7 @@ class Face(NamedTuple):
     Attributes:
         level: the surface of which it is a part, without edges.
         plane: its unit normal out of the admissible side, and its offset along that [m]; None: it is not flat.
-        longer: the surface with a face so far [m] outside of this one; None: none is known.
+        longer: function that returns the surface with this face moved out by a distance [m]; None: none is known.
     """
 
     level: Surface
@@ -60,28 +60,28 @@ class Face(NamedTuple):
     longer: Callable[[float], Surface] | None
 
     def distance(self, points: Floats) -> Floats:
-        """How far points (3, N) are out of its admissible side [m], to first order."""
+        """Return how far points (3, N) are out of its admissible side [m], to first order."""
         if self.plane is not None:
             return np.asarray(self.plane[0] @ points - self.plane[1])
         return _distance(self.level, points)
 
     def normals(self, points: Floats) -> Floats:
-        """Unit normals out of the admissible side (3, N)."""
+        """Return unit normals out of the admissible side (3, N)."""
         if self.plane is not None:
             return np.repeat(self.plane[0][:, None], points.shape[1], axis=1)
         return normalized(side_of(self.level) * self.level.gradient(points))
 
     def onto(self, points: Floats) -> Floats:
-        """Points moved onto it."""
+        """Return points moved onto the face."""
         for _move in range(1 if self.plane is not None else 4):
             points = points - self.distance(points) * self.normals(points)
         return points
 
 
 class Seam(NamedTuple):
-    """A face that two rooms have in common: of each the room, the surface in it, and the face of that.
+    """A face that two rooms have in common: for each the room, the surface in it, and the face of this surface.
 
-    `grown` is that of which the face is moved, 0 or 1; None: a room is added. Faces that do not move as
+    `grown` is 0 or 1, the room with the moved face; None: a room is added. Faces that do not move as
     one are not `together`, and have a wall between them.
     """
 
@@ -96,7 +96,7 @@ class Seam(NamedTuple):
 
 
 def faces_of(surface: Surface) -> list[Face]:
-    """The faces of a surface, in an order that does not depend on its size."""
+    """Return the faces of a surface, in an order that does not depend on its size."""
     if isinstance(surface, Plane):
         ((normal, offset),) = surface.half_spaces()
         return [Face(surface, (np.array(normal), offset), lambda by: replace(surface, offset=surface.offset + by))]
@@ -146,7 +146,7 @@ def _faces_of_box(surface: Box, k: int) -> list[Face]:
 def _pair(
     surface: Surface, center: Any, axis: Floats, half: float, given: Callable[[float], dict[str, Any]]
 ) -> list[Face]:
-    """Two faces across an axis, so far on both sides of a centre."""
+    """Return two faces across an axis, at the distance `half` on both sides of a centre."""
     side, middle = side_of(surface), float(axis @ np.array(center))
 
     def longer(sign: float) -> Callable[[float], Surface]:
@@ -165,7 +165,7 @@ def _pair(
 
 
 def seams_of(rooms: Sequence[Room]) -> list[Seam]:
-    """The faces that rooms have in common, but for those of walls that come and go, and those that have a door.
+    """Return the faces that rooms have in common, except those of walls with `present`, and those that have a door.
 
     Raises:
         SceneError: two rooms have a face in common that is of a kind that cannot be moved.
@@ -181,7 +181,7 @@ def seams_of(rooms: Sequence[Room]) -> list[Seam]:
 
 
 def _still(room: Iterable[Surface]) -> tuple[Surface, ...]:
-    """A room as it is given, before it moves."""
+    """Return a room as it is given, before it moves."""
     return tuple(one.at_rest() for one in room)
 
 
@@ -212,7 +212,7 @@ def _between(rooms: Sequence[Room], pair: tuple[int, int], box: tuple[Floats, Fl
 
 
 def _may_be_one(face: Face, mate: Face, size: float) -> bool:
-    """Whether two faces may be one, seen from both sides, by what is known of them at once."""
+    """Whether two faces may be one, seen from both sides, by their immediate data."""
     if face.plane is not None and mate.plane is not None:
         (n, offset), (m, its) = face.plane, mate.plane
         return bool(np.abs(n + m).max() <= _ROUNDINGS and _is_at(-(offset + its), size))
@@ -253,7 +253,7 @@ class _Rooms(NamedTuple):
         return any(self._places(face, (volume_of(door).at_rest(),)).shape[1] for door in doors)
 
     def _places(self, face: Face, within: Sequence[Surface]) -> Floats:
-        """Places on a face of the first room that are inside it, at the other one, and in some volumes (3, N)."""
+        """Return places (3, N) on a face of the first room, inside it, at the other one, and in volumes `within`."""
         margin, shift = _WITHIN * _BESIDE * self.size, _BESIDE * self.size
         asked = [(one, -1.0, margin) for one in self.room] + [(one, 1.0, margin) for one in self.other]
         asked += [(one, 0.0, 0.0) for one in within]
@@ -284,7 +284,7 @@ class _Rooms(NamedTuple):
         return points[:, (out <= 0.0) & np.isfinite(points).all(axis=0)]
 
     def is_within(self, grown: int, k: int, face: Face) -> bool:
-        """Whether what one of the rooms gains where a face of its surface k is moved is within the other one."""
+        """Whether the volume that one of the rooms gains if a face of surface k is moved is within the other one."""
         assert face.longer is not None
         room, other = (self.other, self.room) if grown else (self.room, self.other)
         larger = (*room[:k], face.longer(FAR * self.size), *room[k + 1 :])
@@ -297,12 +297,12 @@ class _Rooms(NamedTuple):
 
 
 def _gaps(room: Room, points: Floats) -> Floats:
-    """The largest `_gap` of a room."""
+    """Return the largest `_gap` of a room."""
     return np.asarray(np.max([_gap(one, points) for one in room], axis=0))
 
 
 def _gap(surface: Surface, points: Floats) -> Floats:
-    """`_distance`, with infinity in place of NaN."""
+    """Return `_distance`, with infinity in place of NaN."""
     found = _distance(surface, points)
     return np.asarray(np.where(np.isnan(found), np.inf, found))
 
@@ -316,7 +316,7 @@ def _distance(surface: Surface, points: Floats) -> Floats:
 
 
 def joined(rooms: Sequence[dict[Surface, Any]], seams: Sequence[Seam], reach: float) -> list[dict[Surface, Any]]:
-    """Rooms, each its surfaces with what is known of each, that overlap by a reach [m] at their common faces."""
+    """Return rooms, each a dict of its surfaces, that overlap by a reach [m] at their common faces."""
     made = [list(room.items()) for room in rooms]
     added = []
     for seam in seams:
