@@ -436,7 +436,7 @@ class Scene:
         return any(isinstance(law, str) for piece in self.pieces.each for law in piece.laws)
 
     def pull(self) -> Gravity | None:
-        """Return gravity as kernels take it."""
+        """Return gravity as the record of kernels."""
         return None if self.gravity is None else Gravity(*self.gravity)
 
     @once
@@ -452,7 +452,7 @@ class Scene:
     # --- The arguments of kernels --------------------------------------------------------------------
 
     def compiled(self, largest: float | None = None, apart: str | None = None) -> CompiledScene:
-        """Return the scene as kernels take it, for points, or for balls with radii up to `largest` [m].
+        """Return the scene with the records of kernels, for points, or for balls with radii up to `largest` [m].
 
         With `apart`, the name of a method, each listed solid is a wall; without it, solids of one kind are a field. In
         fixed steps of points each field, and each union of several rooms, is one wall too.

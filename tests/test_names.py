@@ -27,6 +27,13 @@ TURNS = re.compile(
 STRINGS = (tokenize.STRING, getattr(tokenize, "FSTRING_MIDDLE", tokenize.STRING))  # the second from Python 3.12 on
 # Of what users read, --help among it, and of what explains the code, also "whose" of things.
 PLAIN = re.compile(TURNS.pattern + r"|\b[Ww]hose\b")
+# Turns of docstrings and comments that leave a reader to find the noun: an amount is named, and so is a thing.
+ELLIPSES = re.compile(
+    r"\b[Ss]o (many|much|few|often)\b(?! that)|\b[Tt]hat many\b|\bhow many (there|they) are\b|\bone of (which|both)\b"
+    r"|\b[Ww]hat (moves|becomes|comes|slides|crosses|flies|stays|turns|rests|hits|touches|remains)\b"
+    r"|\b(of|than|less|but) what\b|\bwhat (they|these|those) \w+|\b[Aa]s kernels (take|know) (it|them)\b"
+    r"|\bAs of\b|^\"*(The same|Those|That|Of) (of|by|for|as|with|that)\b|\bLet (those|them|it)\b|\basked again\b"
+)
 PAGES = [
     path
     for pattern in (
@@ -102,6 +109,17 @@ def test_texts_are_in_plain_words():
             tokens = list(tokenize.tokenize(file.readline))
         texts = [one for one in tokens if one.type in (tokenize.COMMENT, *STRINGS)]
         found += [f"{path}:{one.start[0]}: {turn[0]}" for one in texts for turn in turns.finditer(one.string)]
+    assert found == []
+
+
+def test_sentences_name_what_they_are_about():
+    """Docstrings and comments of the package."""
+    found = []
+    for path in ROOT.rglob("*.py"):
+        with path.open("rb") as file:
+            tokens = list(tokenize.tokenize(file.readline))
+        texts = [one for one in tokens if one.type == tokenize.COMMENT or one.string.startswith('"""')]
+        found += [f"{path}:{one.start[0]}: {turn[0]}" for one in texts for turn in ELLIPSES.finditer(one.string)]
     assert found == []
 
 

@@ -63,7 +63,7 @@ class BallGrid(Record):
     y: Axis
     z: Axis
     near: Array  # bool, whether a ball in a cell may touch a wall
-    few: Any = None  # 1.0 if an axis has so few cells that two images of a ball may be near another ball
+    few: Any = None  # 1.0 if two images of a ball may be near another ball, as an axis has few cells
 
     def axes(self):
         """The three axes."""

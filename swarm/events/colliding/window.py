@@ -83,7 +83,7 @@ class Windows:
     """The windows of a scene with walls that move or become absent: epochs, or parts of epochs between two instants.
 
     Attributes:
-        numbers: the array of the window, as kernels take it.
+        numbers: the array of the window for kernels.
     """
 
     def __init__(self, compiled: CompiledScene, clock: Floats) -> None:

@@ -240,7 +240,7 @@ def _is_ring(rows: list[Row], nothing: float) -> bool:
 
 
 def _reversed(rows: tuple[Row, ...]) -> list[Row]:
-    """Return the same outline the other way round: the bulge of a side is then at its other vertex."""
+    """Return the outline in the opposite sense: the bulge of a side is then at its other vertex."""
     turned = rows[::-1]
     return [(x, y, -turned[(k + 1) % len(turned)][2]) for k, (x, y, _bulge) in enumerate(turned)]
 

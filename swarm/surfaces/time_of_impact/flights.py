@@ -92,13 +92,13 @@ def sooner(time, found, number, later):
 # A flight in lanes: the state of the safe steps of each wall, in this number of rows for each wall.
 COURSE = 13
 _WINDOW, _TIME, _LAST, _CLOSE = 5, 6, 7, 8
-# Of a polynomial: all its numbers except the window
+# Rows of a polynomial: all its numbers except the window
 _OF_POLYNOMIAL = 0, 1, 2, 3, 4, 5, 8
 # A guess, where a polynomial has no start and end
 _GUESS = 8
-# Of a fall with a guess: all powers
+# Rows of a fall with a guess: all powers
 _OF_FALL = 0, 1, 2, 3, 4, 9, 10, 11, 12
-# Of a flight by looks: its constants, and the next look and the last one
+# Rows of a flight by looks: its constants, the next look and the last look
 _OF_CONSTANTS = 4, 5, 8
 _OF_LOOKS = 0, 1, 2, 3
 
