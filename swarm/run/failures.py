@@ -19,7 +19,7 @@ from ..kernel.vector import ZERO, column
 from ..methods.base import Method
 from ..scene import Scene
 from ..state import State
-from ..surfaces.surface import shown
+from ..surfaces.surface import named, shown
 from ..surfaces.wall_law import leave_of, mirrored, sentence_of, why_wrong
 from .options import Task
 from .preflight import softness
@@ -86,7 +86,7 @@ def _in_gap(scene: Scene, place: Any, moment: float, radius: float) -> str:
     touched = np.flatnonzero(outside >= -_TOUCHES * scene.finite_size()).tolist()
     if len(touched) < 2:
         return ""
-    names = " and ".join(_named(scene, wall) for wall in touched)
+    names = " and ".join(named(wall, scene.surfaces[wall]) for wall in touched)
     return (
         f", where it touches {names} at once: a gap as wide as the ball, {2.0 * radius:g} m, leaves it no way between "
         "two impacts; make the gap wider than that or the ball smaller, or let it not come there"
@@ -134,7 +134,7 @@ def require_admissible(
     outside &= ~state.gone()
     if outside.any():
         wall, particle = np.unravel_index(int(np.argmax(distances * outside)), distances.shape)
-        depth = f"{distances[wall, particle]:.3g} m outside {_named(scene, int(wall))}"
+        depth = f"{distances[wall, particle]:.3g} m outside {named(int(wall), scene.surfaces[wall])}"
         phi = "; ".join(filter(None, (depth, _unproved(scene, int(wall)))))
         raise RunError(f"{_failed(moment)} {first + particle}: it is {phi}")
 
@@ -146,8 +146,9 @@ def sentence_of_coming(
     wall, particle = found
     place = shown(state.position[:, particle], 6)
     return (
-        f"{_named(scene, wall)} must come where no particle is: at {instant:g} s particle {first + particle} is "
-        f"{depth:.3g} m inside, at {place} m; let it come later or elsewhere, or start that particle elsewhere"
+        f"{named(wall, scene.surfaces[wall])} must come where no particle is: at {instant:g} s particle "
+        f"{first + particle} is {depth:.3g} m inside, at {place} m; let it come later or elsewhere, or start that "
+        "particle elsewhere"
     )
 
 
@@ -156,7 +157,7 @@ def _place(scene: Scene, state: State, particle: int, moment: float) -> str:
     remaining = 0.0 if state.contacts is None else state.contacts.remaining[particle]
     place, found = state.position[:, particle], moment - remaining
     wall = int(np.argmax(scene.distances_outside(place[:, None], found)[:, 0]))
-    where = f"{shown(place, 6)} m, at {_named(scene, wall)}"
+    where = f"{shown(place, 6)} m, at {named(wall, scene.surfaces[wall])}"
     return f"; it is at {where}" + (f" at {found:.9g} s" if remaining > 0.0 else "")
 
 
@@ -183,10 +184,6 @@ def _of_law(compiled: CompiledScene, state: State, particle: int, moment: float,
 
 def _failed(moment: float) -> str:
     return f"the frame at {moment:g} s failed at particle"
-
-
-def _named(scene: Scene, wall: int) -> str:
-    return f"surfaces[{wall}] ({type(scene.surfaces[wall]).__name__})"
 
 
 @contextlib.contextmanager
