@@ -67,7 +67,8 @@ class ReactingRun(BaseRun):
             np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, events.NONE), np.zeros(n, bool),
             np.zeros(n, np.int64), np.zeros(n, bool), np.zeros(n, np.int64),
             Heap(np.zeros(n), number.copy(), number.copy()), state.heat, state.crossed, self._watchers(),
-            absorbed=state.absorbed, escape_time=state.escape_time, starts=state.starts,
+            absorbed_time=state.absorbed_time, absorbed_wall=state.absorbed_wall, escape_time=state.escape_time,
+            starts=state.starts,
         )  # fmt: skip
         self._instants = self._scene.instants if self._scene.has_doors() else None
         self._freedoms = freedoms_of(compiled, particles.velocity)
@@ -195,8 +196,7 @@ class ReactingRun(BaseRun):
     def _arrays(self) -> dict[str, Any]:
         queue: Any = self._queue
         return {
-            **queue._replace(heap=None, mass=None, watchers=None, image=None, absorbed=None)._asdict(),
-            "absorbed_time": self.state.absorbed_time, "absorbed_wall": self.state.absorbed_wall,
+            **queue._replace(heap=None, mass=None, watchers=None, image=None)._asdict(),
             "walls": self._freedoms, "key": queue.heap.key, "clock": self._clock,
         }  # fmt: skip
 

@@ -8,8 +8,6 @@ losses the result is that of `Impact`, whatever the penalty. They act on the cen
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ..common.status import Status
 from ..contact.reflection import given
 from ..contact.wall_impact import Arriving, RandomSource, book_energy, by_law, give_work
@@ -17,6 +15,7 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, square
+from ..state import absorb
 from ..surfaces.in_motion.posed import Posed
 from . import grain_arrays as col
 from .at_walls import step_at_wall
@@ -108,7 +107,7 @@ def _act(wall, own, world, at, time):
     if world.counts is not None:
         world.counts.give(member, heat, bounce.wait)
     if books.absorbed_time is not None and bounce.wait == math.inf:
-        books.absorbed_time[one], books.absorbed_wall[one] = time, np.int32(member)
+        absorb(books, one, member, time)
         return Status.LEASE_ENDED.value
     if world.held is not None and bounce.wait > 0.0:
         hold(world.held, grains, i, time + bounce.wait)

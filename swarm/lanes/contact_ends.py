@@ -194,7 +194,7 @@ def _send(method, walls, now, gravity, share, lanes, i, at):
     heat = book_energy(state, (row, p, p), mass, bounce)
     if share.counts is not None:
         share.counts.give(wall, heat, bounce.wait)
-    if state.absorbed is not None and bounce.wait > 0.0:
+    if state.absorbed_time is not None and bounce.wait > 0.0:
         _keep(method, walls, share, lanes, i, wall, bounce.wait)
     return bounce.impulse
 

@@ -132,7 +132,7 @@ def _send_off(method, walls, gravity, share, i):
     put(state.velocity, 0, i, sent.v)
     struck = Struck(i, wall, share.moment - remaining, r, v, sent.v, sent.impulse * mass)
     share.watchers.hit(state.image, share.watchers.with_slip(laws, now, struck))
-    if state.absorbed is not None and not detain(share, i, wall, remaining, sent.wait):
+    if state.absorbed_time is not None and not detain(share, i, wall, remaining, sent.wait):
         end_frame(share, i)
         return True
     contacts.remaining[i] = remaining - sent.wait

@@ -87,7 +87,7 @@ def _book(method, walls, share, lanes, i):
     for watch in share.watchers.of_impacts():
         watch.note(lanes, i, sent.impulse)
     lanes.wall[i] = sent.wall
-    if state.absorbed is not None and sent.wait > 0.0:
+    if state.absorbed_time is not None and sent.wait > 0.0:
         goes_on = detain(share, p, wall, lane.remaining, sent.wait)
         lane.remaining = lane.remaining - sent.wait if goes_on else 0.0
         lanes.wall[i] = lanes.wall[i] if goes_on else -1.0

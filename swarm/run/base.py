@@ -412,10 +412,10 @@ class BaseRun:
 def arrays_of(found: Mapping[str, Any]) -> Arrays:
     """Return the arrays of a checkpoint, without None; arrays of a named tuple have its name first.
 
-    >>> from swarm.state import Absorbed
-    >>> absorbed = Absorbed(np.zeros(1), np.zeros(1, np.int32))
-    >>> list(arrays_of({"impacts": np.zeros(1), "heat": None, "absorbed": absorbed}))
-    ['impacts', 'absorbed.time', 'absorbed.wall']
+    >>> from swarm.state import Crossed
+    >>> crossed = Crossed(*np.zeros((3, 1)))
+    >>> list(arrays_of({"impacts": np.zeros(1), "heat": None, "crossed": crossed}))
+    ['impacts', 'crossed.side', 'crossed.number', 'crossed.sums']
     """
     arrays: Arrays = {}
     for name, value in found.items():

@@ -87,7 +87,7 @@ def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], las
             # Particles at rest need no kernel.
             state.impulse[: len(contacts.load)] += contacts.load * (span * state.mass)
             contacts.sliding[:] += span * rests
-    if state.escape_time is not None or state.absorbed is not None:
+    if state.escape_time is not None or state.absorbed_time is not None:
         phase[state.gone()[: len(phase)]] = ARRIVED
     if state.starts is not None:
         left = method.parts(end - state.starts[: len(phase)])

@@ -3,8 +3,6 @@
 import math
 from typing import Any
 
-import numpy as np
-
 from ...common.status import Status
 from ...contact.reflection import from_relative, given, relative, rub, wall_velocity
 from ...contact.wall_impact import Arriving, book, impact_on_wall
@@ -14,6 +12,7 @@ from ...kernel.jit import outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, dot, either, norm, square, with_square
 from ...lanes.watching.log import Struck
+from ...state import absorb
 from ...surfaces.presence.openings import is_open
 from .clock import moment_of
 from .followed import follow, settle
@@ -98,8 +97,7 @@ def _end(box, flock, clock, wall, i, now, after):
     elif after.wait > 0.0:
         ended = Status.WAITS.value if flock.holds is None else STAYS
         if box.gates is not None and box.gates.absorbed_time is not None and after.wait == math.inf:
-            box.gates.absorbed_time[index(i)] = moment_of(clock, now)
-            box.gates.absorbed_wall[index(i)] = np.int32(box.owner(wall))
+            absorb(box.gates, index(i), box.owner(wall), moment_of(clock, now))
             ended = GONE
     return ended
 
