@@ -13,6 +13,7 @@ from ..compiled_scene import CompiledScene
 from ..contact.laws import NONE, Laws
 from ..errors import RunError
 from ..kernel.limits import SOLVED_PLACE
+from ..kernel.random import UNSEEDED, Seeding
 from ..methods.base import Method
 from ..motion import pose
 from ..observables import CHUNK
@@ -22,7 +23,6 @@ from ..run.doors import comers
 from ..run.impacts import ThreadLog
 from ..run.observed import gone_of
 from ..run.preflight.counting import Counting
-from ..run.starting_state import UNSEEDED, Seeding
 from ..run.tally import UNWATCHED, Watched
 from ..run.tiers import Tier
 from ..scene import Scene
@@ -113,7 +113,7 @@ class BodyRun(BaseRun):
         self._led_start, self._scale = np.zeros((2, n))
         self._energy_start = self._bodies.energy
         if bodies.births is not None:
-            self._feed = BodyFeed(scene, bodies, seeding.seed, self._energy_of)
+            self._feed = BodyFeed(scene, bodies, seeding.unsigned(), self._energy_of)
             self.state = self.state._replace(born_time=np.tile(self._feed.born_time, points))
         for some, r, v in self._blocks():
             self._led_start[some] = self._energies.led(r, v)

@@ -9,7 +9,7 @@ from .. import observables
 from ..ball_numbers import BallNumbers
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
-from ..contact.wall_impact import RandomSource
+from ..kernel.random import Seeding
 from ..methods.base import Method
 from ..particles import Particles
 from ..run import failures
@@ -18,7 +18,6 @@ from ..run.doors import comers, require_free
 from ..run.feeding import Feed, There
 from ..run.impacts import ThreadLog
 from ..run.preflight.counting import Counting
-from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..scene import Scene
@@ -70,13 +69,13 @@ class CollidingRun(BaseRun):
             crossed=self._counting.crossed(particles.position), **none_left(n, openings is not None, ends),
         )  # fmt: skip
         state, self._balls, gates = self.state, balls, None
-        feed = None if particles.births is None else Feed(scene, particles, seeding.seed, self._is_clear)
+        feed = None if particles.births is None else Feed(scene, particles, seeding.unsigned(), self._is_clear)
         if openings is not None or ends or feed is not None:
             gates = Gates(openings, state.escape_time, state.absorbed_time, state.absorbed_wall)
         box = box._replace(window=None if self._windows is None else self._windows.numbers, gates=gates)
         self._box = self._with_heavy(compiled, box)
         if any(one.send_off for one in every):
-            self._box = self._box._replace(source=RandomSource(seeding.signed(), seeding.first))
+            self._box = self._box._replace(seeding=seeding)
         super().__init__(compiled, method, n, threads, Tier(compile, self._box, n), seeding, watched)
         if feed is not None:
             self._feed, self.state = feed, self.state._replace(born_time=feed.born_time)

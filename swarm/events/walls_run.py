@@ -8,9 +8,9 @@ import numpy as np
 from .. import observables
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
-from ..contact.wall_impact import RandomSource
 from ..kernel.gravity import potential
 from ..kernel.heap import Heap
+from ..kernel.random import Seeding
 from ..kernel.vector import vec
 from ..methods.base import Method
 from ..observables import CHUNK
@@ -22,7 +22,6 @@ from ..run.impacts import ThreadLog
 from ..run.observed import Observed, observed_of
 from ..run.preflight.counting import Counting
 from ..run.present import Presence
-from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..state import State, none_left
@@ -46,7 +45,7 @@ class ReactingRun(BaseRun):
     ) -> None:  # fmt: skip
         n, walls, gravity = len(particles), len(compiled.numbering.surfaces_of_rows), compiled.scene.pull()
         energy = 0.5 * (particles.velocity**2).sum(axis=0) + potential(gravity, vec(particles.position))
-        self._source = RandomSource(seeding.signed(), seeding.first)
+        self._seeding = seeding
         self._scenery = self._scenery_of(compiled, 0.0)
         births, every = particles.births, self._scenery.each_laws()
         heat = np.zeros((walls, n)) if any(laws.give_heat for laws in every) else None
@@ -79,7 +78,7 @@ class ReactingRun(BaseRun):
     def _scenery_of(self, compiled: CompiledScene, moment: float) -> SceneWalls:
         """The walls in the frame that ends at a moment [s], with random numbers if laws send particles off."""
         found = scenery_of(compiled, moment)
-        return found._replace(source=self._source) if any(laws.send_off for laws in found.each_laws()) else found
+        return found._replace(seeding=self._seeding) if any(laws.send_off for laws in found.each_laws()) else found
 
     def _prepare(self, span: float, moment: float) -> None:
         self._scenery = self._scenery_of(self._compiled, moment)

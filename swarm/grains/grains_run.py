@@ -12,9 +12,9 @@ from ..ball_numbers import BallNumbers
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
 from ..contact.laws import NONE
-from ..contact.wall_impact import RandomSource
 from ..errors import RunError
 from ..kernel.arrays import aligned_copy
+from ..kernel.random import Seeding
 from ..lanes.watching.watchers import Followed
 from ..methods import Penalty
 from ..methods.base import Method
@@ -26,7 +26,6 @@ from ..run.feeding import Feed, There
 from ..run.impacts import ThreadLog
 from ..run.observed import observed_of
 from ..run.preflight.counting import Counting
-from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..state import Balls, Floats, State, none_left
@@ -75,7 +74,7 @@ class GrainsRun(BaseRun):
         rubs, spin = self._matter.rubs, particles.spin
         if spin is None and rubs:
             spin = np.zeros((3, n))
-        feed = None if particles.births is None else Feed(scene, particles, seeding.seed, self._is_clear)
+        feed = None if particles.births is None else Feed(scene, particles, seeding.unsigned(), self._is_clear)
         balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
         openings, ends = self._matter.openings, laws.may_end
         # The energy that contacts store with a wall is lost when the wall becomes absent.
@@ -123,7 +122,7 @@ class GrainsRun(BaseRun):
             self._rows_of(there),
             *self._room(len(there), _PAIRS * n, _AT_WALLS * n, n if self._fields.faces else None), books,
             followed=None if counters is None else followed,
-            sender=Sender(at_ends, RandomSource(seeding.signed(), seeding.first)) if laws.send_off else None,
+            sender=Sender(at_ends, seeding) if laws.send_off else None,
             held=None if holds is None else held_of(state.mass, rubs), heavy=self._heavy,
         )  # fmt: skip
         self._clock = np.zeros(arrays.CLOCK)

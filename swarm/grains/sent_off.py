@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 
 from ..common.status import Status
 from ..contact.reflection import given
-from ..contact.wall_impact import Arriving, RandomSource, book_energy, by_law, give_work
+from ..contact.wall_impact import Arriving, book_energy, by_law, give_work
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
+from ..kernel.random import Seeding
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, square
 from ..state import absorb
@@ -29,7 +30,7 @@ class Sender(NamedTuple):
     """The laws of walls, and the arrays that they need besides the walls."""
 
     laws: Any  # `Laws` without restitution and friction, which act during a contact
-    source: RandomSource
+    seeding: Seeding
 
 
 class _Facing(Record):
@@ -84,7 +85,7 @@ def _act(wall, own, world, at, time):
         return Status.DONE.value
     one, touches = index(grains.number[i]), world.touches
     member = world.places[number][index(met_member(wall, touches.listed, touches.spans, c, radius, r))]
-    random = sender.source.of_impact(one, books.ended[one], sender.laws)
+    random = sender.seeding.of_impact(one, books.ended[one], sender.laws)
     books.ended[one] += 1
     before, mass = v + 2.0 * away * n, 1.0 / grains.place[i, col.LIGHTNESS]
     arriving = Arriving(r, before, square(before), mass)

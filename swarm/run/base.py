@@ -16,6 +16,7 @@ from ..ball_numbers import BallNumbers
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
 from ..errors import RunError
+from ..kernel.random import Seeding
 from ..lanes.watching.watchers import Watchers
 from ..methods.base import Method
 from ..observables import CHUNK
@@ -25,7 +26,6 @@ from .feeding import Feed
 from .impacts import ThreadLog
 from .observed import Observed, balance, gone_of, poses_of, with_walls
 from .preflight.counting import Counting
-from .starting_state import Seeding
 from .tally import Watched
 from .tiers import Tier
 from .watch import Watch

@@ -15,6 +15,7 @@ from ..compiled_scene import CompiledScene
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, HELD, PHASES
 from ..contact.hold import One, Two
 from ..contact.laws import NONE
+from ..kernel.random import UNSEEDED, Seeding
 from ..lanes import block as blocks
 from ..lanes import careful, contact_events, slide, sliding, table
 from ..lanes import lane_arrays as lanes
@@ -29,7 +30,7 @@ from .base import Arrays, BaseRun, result_of
 from .impacts import ThreadLog
 from .preflight.counting import Counting
 from .present import Presence
-from .starting_state import UNSEEDED, Seeding, begin, have_lasted, holders_of_resting, state_of
+from .starting_state import begin, have_lasted, holders_of_resting, state_of
 from .tally import UNWATCHED, Watched
 from .tiers import Tier
 from .turns import End, Turns, left_behind
@@ -79,7 +80,7 @@ class Run(BaseRun):
         self._present = Presence(particles.births, self.state, self._size)
         self._ticket = np.zeros(1, np.int64)
         self._phase = np.zeros(n, np.int8)
-        self._seed = seeding.signed()
+        self._seeding = seeding
         self._kinds: set[int] = set()  # the phases other than flight that particles have been in
         self._halted = lanes.none_halted(self._booked)
         self._lanes: list[lanes.Lanes] = []  # the lanes that no thread uses now
@@ -127,8 +128,7 @@ class Run(BaseRun):
         return freed
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
-        seeding = Seeding(self._seed, self._first)
-        return failures.of_frame(self._compiled, self._method, self.state, (status, item), moment, seeding)
+        return failures.of_frame(self._compiled, self._method, self.state, (status, item), moment, self._seeding)
 
     def _share(self, span: float) -> End:
         """Advance and observe the particles that one thread draws; return the end of this."""
@@ -245,7 +245,7 @@ class Run(BaseRun):
         return Share(
             self._present.flying(self.state), self._present.of(self._phase), np.zeros(PHASES, np.int64), self._halted,
             draws, self._watch.passes, span,
-            self._seed, self._first, self._moment, self._watchers(),
+            self._seeding, self._moment, self._watchers(),
         )  # fmt: skip
 
     def _flying(self, share: Share, mine: lanes.Lanes) -> tuple[Any, ...]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
 from ..errors import RunError, SceneError
-from ..kernel.random import Stream
+from ..kernel.random import Seeding
 from ..kernel.vector import ZERO, column
 from ..methods.base import Method
 from ..scene import Scene
@@ -23,7 +23,6 @@ from ..surfaces.surface import named, shown
 from ..surfaces.wall_law import leave_of, mirrored, sentence_of, why_wrong
 from .options import Task
 from .preflight import softness
-from .starting_state import Seeding
 
 # The end of a sentence on a particle that does not go on, if no user-defined function may be the cause.
 _REPORT = "; if nothing is special about the place, it is an error of swarm: please report it with the scene"
@@ -170,7 +169,7 @@ def _of_law(compiled: CompiledScene, state: State, particle: int, moment: float,
     r, v = column(state.position, 0, particle), column(state.velocity, 0, particle)
     n = -1.0 * walls.unit_normal(wall, r)
     u = walls.velocity(wall, r) if scene.moves() else ZERO
-    random = Stream(seeding.seed, seeding.first + particle, state.impacts[particle], 0, laws.across)
+    random = seeding.of_impact(particle, state.impacts[particle], laws)
     with np.errstate(all="ignore"):
         for one in (one for one in laws.own or () if one.has(wall)):
             for k, law in enumerate(one.laws_of(wall)):

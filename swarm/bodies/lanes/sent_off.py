@@ -102,7 +102,7 @@ def _by_law(bodies, state, name, frame, contact, i):
     mass = 1.0 / blow.schur[0, 0]
     # Every event has another number, as the body has a blow, or makes a step, between two events.
     event = MOST_CONTACTS * (state.impacts[number] + state.steps[number]) + a
-    random = touching.random.of_impact(number, event, touching.laws)
+    random = touching.seeding.of_impact(number, event, touching.laws)
     happens, sent = _sent(blow, state, rate, p, (mass, rests), random, i)
     if not happens:
         return False

@@ -110,7 +110,7 @@ def _turned(box, flock, books, walls, wall, ball):
         # The friction of a ball that turns is added below.
         laws = laws._replace(friction=None)
     if laws.send_off:
-        random = box.source.of_impact(i, books.impacts[index(i)], laws)
+        random = box.seeding.of_impact(i, books.impacts[index(i)], laws)
     touch = None
     # A turning wall has the same normal velocity at the centre of the ball: only friction and laws need the contact.
     if laws.moving is not None and (laws.friction is not None or laws.send_off):

@@ -45,7 +45,7 @@ def strike_heavy(box, flock, books, clock, i, now):
     if box.gates is not None and box.gates.absorbed_time is not None and not blow.stays:
         v1, kept = v, left
         absorb(box.gates, index(i), blow.owner, moment_of(clock, now))
-    if box.source is not None and math.isnan(v1.x):
+    if box.seeding is not None and math.isnan(v1.x):
         return Status.SENT_WRONG.value
     flock.put(i, now, blow.r, v1)
     flock.keep(i, kept)
@@ -76,8 +76,8 @@ def _blow(box, flock, wall, flight, ball):
     if box.loss is not None:
         spares = box.loss.spares(flock, i, flight.time)
         walls = tuple(one._replace(restitution=select(spares, 1.0, one.restitution)) for one in walls)
-    if box.source is not None:
-        random = box.source.of_impact(i, impacts, box.laws)
+    if box.seeding is not None:
+        random = box.seeding.of_impact(i, impacts, box.laws)
     return strike(walls, wall, heavy.freedoms, flight, box.kinds.mass_of(i), random, Ball(i, radius, box.turning))
 
 

@@ -52,7 +52,7 @@ class SceneWalls(NamedTuple):
     reacting: Any
     pull: Any  # gravity, or None
     size: float = 1.0  # of the scene [m]
-    source: Any = None  # `RandomSource` where walls send particles off by a law
+    seeding: Any = None  # `Seeding` where walls send particles off by a law
     openings: Any = None  # None, or each `Opened` of the given walls
 
     def each_laws(self) -> list[Laws]:
@@ -190,7 +190,7 @@ def _bounce(scenery, queue, i, wall, rule, now):
         put(queue.position, 0, i, r)
     arriving, laws, random = Arriving(r, v, twice, m), scenery.laws, None
     if laws.send_off:
-        random = scenery.source.of_impact(i, queue.impacts[i], laws)
+        random = scenery.seeding.of_impact(i, queue.impacts[i], laws)
     if scenery.openings is not None:
         near = closeness(walls)
         wall = hit_wall(scenery.openings, scenery, walls, (r, v), wall, near)
@@ -228,8 +228,8 @@ def _strike(scenery, walls, queue, i, rule, now):
         if out >= 0.0:
             _escape(queue, i, out, rule, now)
             return
-    if scenery.source is not None:
-        random = scenery.source.of_impact(i, queue.impacts[i], scenery.laws)
+    if scenery.seeding is not None:
+        random = scenery.seeding.of_impact(i, queue.impacts[i], scenery.laws)
     blow = strike(scenery.reacting, queue.struck[i], walls, flight, m, random)
     left = 2.0 * queue.energy[i] - 2.0 * (blow.given + blow.lost) / m
     if queue.heat is not None:
@@ -331,7 +331,7 @@ def _carry_out(scenery, freedoms, queue, i, now, rule):
         _strike(scenery, freedoms, queue, i, rule, now)
     elif queue.wall[i] >= 0.0:
         _bounce(scenery, queue, i, queue.wall[i], rule, now)
-    if scenery.source is not None and math.isnan(queue.velocity[0, i]):
+    if scenery.seeding is not None and math.isnan(queue.velocity[0, i]):
         return Status.SENT_WRONG.value
     if not is_gone(queue, i) and not _waits(queue, i):
         _aim(scenery, queue, i, rule.end)
