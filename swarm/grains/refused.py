@@ -8,14 +8,13 @@ import numpy as np
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
 from ..kernel.limits import TINY
-from ..kernel.vector import dot, norm, square
+from ..kernel.vector import dot, norm, square, vector_at
 from ..methods import Penalty
 from ..methods.fixed_step import thinnest
 from ..pairs import MOST_PRESSED
 from ..surfaces.surface import named
 from . import grain_arrays as col
 from .contacts import apart
-from .grain_arrays import vector_at
 from .overlaps import BALL, OTHER, SIZE, WALL
 
 

@@ -15,12 +15,11 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.random import Seeding
 from ..kernel.record import Record
-from ..kernel.vector import ZERO, Vec, dot, square
+from ..kernel.vector import ZERO, Vec, dot, set_vector, square, vector_at
 from ..state import absorb
 from ..surfaces.in_motion.posed import Posed
 from . import grain_arrays as col
 from .at_walls import step_at_wall
-from .grain_arrays import set_vector, vector_at
 from .held import hold
 from .overlaps import BALL, WALL
 from .vessel import gives_work, met_member
