@@ -38,6 +38,21 @@ class Arriving(Record):
         return self.r if self.touch is None else self.touch
 
 
+class Facing(Record):
+    """A wall at the place of an impact, as its laws take it: its normal, and its velocity or None if no wall moves."""
+
+    n: Vec
+    u: Any = None
+
+    def unit_normal(self, _wall, _r):
+        """Return the normal."""
+        return self.n
+
+    def velocity(self, _wall, _r):
+        """Return the velocity."""
+        return self.u
+
+
 def impact_on_wall(laws, walls, gravity, wall, arriving, random):
     """Return the `Bounce` of a particle that is `Arriving` at a wall: by a law of the wall if one acts, else reflected.
 

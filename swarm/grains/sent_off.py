@@ -10,12 +10,11 @@ from typing import Any, NamedTuple
 
 from ..common.status import Status
 from ..contact.reflection import given
-from ..contact.wall_impact import Arriving, book_energy, by_law, give_work
+from ..contact.wall_impact import Arriving, Facing, book_energy, by_law, give_work
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.random import Seeding
-from ..kernel.record import Record
-from ..kernel.vector import ZERO, Vec, dot, set_vector, square, vector_at
+from ..kernel.vector import ZERO, dot, set_vector, square, vector_at
 from ..state import absorb
 from ..surfaces.in_motion.posed import Posed
 from . import grain_arrays as col
@@ -30,21 +29,6 @@ class Sender(NamedTuple):
 
     laws: Any  # `Laws` without restitution and friction, which act during a contact
     seeding: Seeding
-
-
-class _Facing(Record):
-    """A wall at the end of a contact: its outward normal, and its velocity or None if no wall moves."""
-
-    n: Vec
-    u: Any
-
-    def unit_normal(self, _wall, _r):
-        """The normal."""
-        return self.n
-
-    def velocity(self, _wall, _r):
-        """The velocity."""
-        return self.u
 
 
 @outlined
@@ -88,7 +72,7 @@ def _act(wall, own, world, at, time):
     books.ended[one] += 1
     before, mass = v + 2.0 * away * n, 1.0 / grains.place[i, col.LIGHTNESS]
     arriving = Arriving(r, before, square(before), mass)
-    happens, bounce = by_law(sender.laws, _Facing(n, u), None, float(member), arriving, random)
+    happens, bounce = by_law(sender.laws, Facing(n, u), None, float(member), arriving, random)
     if not happens:
         return Status.DONE.value
     if math.isnan(bounce.v.x):
