@@ -122,7 +122,7 @@ class Particles:
     def fastest(self, against: Floats | None = None) -> float:
         """Return the largest speed [m/s], relative to a velocity `against` (3,) [m/s] if given."""
         velocity = self.velocity if against is None else self.velocity - against[:, None]
-        return float(np.sqrt(np.fmax.reduce((velocity**2).sum(axis=0), initial=0.0)))
+        return float(np.sqrt(np.fmax.reduce(np.add.reduce(velocity**2), initial=0.0)))
 
     def born(self) -> "Particles":
         """Return the particles without rows of NaN, which in a frame of a run with sources are particles not yet born.

@@ -14,8 +14,8 @@ import swarm
 pytestmark = pytest.mark.quick
 
 # Calls of Python functions from `simulate` to the first step of twenty particles in a sphere, at most, and of how many
-# functions by name: 250, and some that differ between versions of Python and NumPy.
-_MOST, _MOST_NAMES = 900, 260
+# functions by name.
+_MOST, _MOST_NAMES = 900, 250
 
 
 def test_a_small_run_calls_few_functions_before_its_first_kernel() -> None:

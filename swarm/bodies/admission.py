@@ -10,7 +10,7 @@ from ..files.origin import require_near
 from ..methods import Impact, Penalty
 from ..methods.base import Method, check_surfaces
 from ..methods.fixed_step import check_solids
-from ..motion.given import require_angles
+from ..motion.given import parts_of, require_angle
 from ..particles import Particles
 from ..run.impacts import require_logged
 from ..run.options import RunOptions, Task
@@ -45,7 +45,8 @@ def task_of(scene: Scene, bodies: Bodies, method: Method, options: RunOptions) -
     bodies = bodies.copy()
     _require_steps(scene, bodies, method, options)
     for point, motion in bodies.body.anchors.items():
-        require_angles(f"anchors[{point}]", motion, options.times.until)
+        for part in parts_of(motion):
+            require_angle(f"anchors[{point}]", part, options.times.until)
     assert method.dt is not None  # type: ignore[attr-defined]
     warn_of_passing(scene, bodies.body)
     if scene.period is not None and (bodies.body.anchors or bodies.body.guides):

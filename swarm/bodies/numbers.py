@@ -1,4 +1,4 @@
-"""A body, and the method that advances it, as kernels take them."""
+"""The records of a body, and of the method that advances it, for kernels."""
 
 import math
 

@@ -37,7 +37,7 @@ _SOLVED, _NEARLY, _GAIN = 2e-14, 1e-10, 0.5
 # `_SOLVED` if friction and a damper act at every contact: 1e-4 of the speeds there. Positions, velocities and
 # spins of piles that fall, roll and lie agree to three digits with those of normal impulses solved to round-off, and
 # overlaps to 1e-9 of a radius; friction leaves errors of 1e-8 to 6e-6. (Rejected: 1e-9, which takes a sweep less as
-# grains fall, and is off by 2e-6 of a radius in a heap of eight.)
+# grains fall, and leaves an error of 2e-6 of a radius in a heap of eight.)
 _BESIDE_FRICTION = 1e-10
 # The ratio of the changes of two successive sweeps is taken to be no less than this.
 _LEAST_RATIO = 0.1

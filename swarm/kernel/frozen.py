@@ -262,7 +262,7 @@ def _root(value: Any) -> str:
 
 def _module_of(value: Any) -> str:
     """Return the module that identifies a value, or nothing if its module does not."""
-    if isinstance(value, (type, types.FunctionType)):  # most of what is asked about
+    if isinstance(value, (type, types.FunctionType)):  # the usual case
         return str(getattr(value, "__module__", ""))
     if isinstance(value, np.ufunc) and getattr(np, value.__name__, None) is value:
         return "numpy"

@@ -57,8 +57,8 @@ def rise_time(c, b, a):
 
 def rise_time_by(c, b, a, discriminant):
     """`rise_time` with a discriminant more exact than b^2 - a c, which has no digits about 1e8 sizes from a solid."""
-    time, bottom = _outer_root(c, b, a, discriminant)
-    misses = (bottom <= 0.0) | ((a < 0.0) & (discriminant < 0.0))
+    over, under = _outer_root(c, b, a, discriminant)
+    time, misses = over / under, (under <= 0.0) | ((a < 0.0) & (discriminant < 0.0))
     return select(misses, math.inf, select(time > 0.0, time, 0.0))
 
 
@@ -84,25 +84,20 @@ NEVER = Quotient(1.0, 0.0)
 def rise_quotient(c, b, a):
     """`rise_time` as a `Quotient`."""
     discriminant = b * b - a * c
-    over, under = _outer_quotient(c, b, a, discriminant)
+    over, under = _outer_root(c, b, a, discriminant)
     misses = (under <= 0.0) | ((a < 0.0) & (discriminant < 0.0))
     return Quotient(*select(misses, tuple(NEVER), (select(over > 0.0, over, 0.0), under)))
 
 
 def rise_time_inside(c, b, a):
     """`rise_time` for a >= 0: a convex cavity, which a particle that moves never misses."""
-    time, bottom = _outer_root(c, b, a, b * b - a * c)
-    return select(bottom <= 0.0, math.inf, select(time > 0.0, time, 0.0))
+    over, under = _outer_root(c, b, a, b * b - a * c)
+    time = over / under
+    return select(under <= 0.0, math.inf, select(time > 0.0, time, 0.0))
 
 
 def _outer_root(c, b, a, discriminant):
-    """Return the root at which c + 2 b t + a t^2 rises, and its denominator."""
-    over, under = _outer_quotient(c, b, a, discriminant)
-    return over / under, under
-
-
-def _outer_quotient(c, b, a, discriminant):
-    """Return this root as a quotient."""
+    """Return the root at which c + 2 b t + a t^2 rises, as a quotient (over, under)."""
     # a > 0, c > 0 by round-off at a grazing hit: the flight touches, it does not miss.
     root = math.sqrt(select(discriminant > 0.0, discriminant, 0.0))
     approaching = b > 0.0

@@ -220,20 +220,19 @@ def led(motion: Motion | None, start: ArrayLike) -> Led:
     return Translation((0.0, 0.0, 0.0)).harmonic(start) if motion is None else motion.harmonic(start)
 
 
-def require_angles(name: str, motion: Any, until: float) -> None:
-    """Raise a `SceneError` if a motion, called `name`, turns by more than LARGEST_ANGLE until a time [s]."""
-    for one in parts_of(motion):
-        oscillates = isinstance(one, Oscillation)
-        if not oscillates and not isinstance(one, Rotation):
-            continue
-        rate = 2.0 * math.pi * one.frequency if oscillates else abs(one.rate)
-        if rate * until > LARGEST_ANGLE:
-            key, value, unit = ("frequency", one.frequency, "1/s") if oscillates else ("rate", one.rate, "rad/s")
-            raise SceneError(
-                f"{name}.{key} must be such that the angle is at most {LARGEST_ANGLE:g} rad at the end, where float64 "
-                f"numbers are {math.ulp(LARGEST_ANGLE):.1g} rad apart, got {value:g} {unit} and thus "
-                f"{rate * until:.3g} rad at {until:g} s"
-            )
+def require_angle(name: str, part: Any, until: float) -> None:
+    """Raise a `SceneError` if a part of the motion called `name` turns by more than LARGEST_ANGLE until a time [s]."""
+    oscillates = isinstance(part, Oscillation)
+    if not oscillates and not isinstance(part, Rotation):
+        return
+    rate = 2.0 * math.pi * part.frequency if oscillates else abs(part.rate)
+    if rate * until > LARGEST_ANGLE:
+        key, value, unit = ("frequency", part.frequency, "1/s") if oscillates else ("rate", part.rate, "rad/s")
+        raise SceneError(
+            f"{name}.{key} must be such that the angle is at most {LARGEST_ANGLE:g} rad at the end, where float64 "
+            f"numbers are {math.ulp(LARGEST_ANGLE):.1g} rad apart, got {value:g} {unit} and thus "
+            f"{rate * until:.3g} rad at {until:g} s"
+        )
 
 
 def unit_axis(rotation: Any) -> Floats:

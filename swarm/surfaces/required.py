@@ -54,7 +54,7 @@ def require(surfaces: Sequence[Surface], purpose: str, asked: Iterable[str], nam
     for i, surface in enumerate(surfaces):
         for wall in surface.walls():
             for part, methods in _asked_of(wall, asked):
-                lacking = sorted({name for method in methods for name in _lacking(part, method)})
+                lacking = sorted(dict.fromkeys(name for method in methods for name in _lacking(part, method)))
                 if lacking:
                     raise SceneError(
                         f"{name or f'surfaces[{i}]'} ({type(surface).__name__}) must give what {purpose} needs, got "

@@ -1,4 +1,4 @@
-"""A scene with reacting walls as kernels take it, made from its description."""
+"""The records of kernels for a scene with reacting walls, made from its description."""
 
 import math
 from typing import Any

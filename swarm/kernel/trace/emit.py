@@ -62,16 +62,16 @@ class FunctionPart:
 
     @functools.cached_property
     def taken(self) -> list[tuple[Argument, tuple[int, ...]]]:
-        """What it takes: of an argument that is an array only those parts of it that are used.
+        """The parts of its arguments that it uses, each as the argument and a path: of an array the numbers it reads.
 
-        A call hands on each of them, and in a union of two boxes balls have arrays of 400.
+        A call passes each of these numbers, and the arrays of balls in a union of two boxes have 400.
         """
         found = dict.fromkeys(_taken_by(self))
         return [(one, path) for one, path in found if not any((one, path[:k]) in found for k in range(len(path)))]
 
 
 def _taken_by(part: FunctionPart) -> Iterator[tuple[Argument, tuple[int, ...]]]:
-    """The arguments that notes are about, each with the path of a part of it."""
+    """Yield the parts of arguments that the notes of a part use, each as the argument and a path."""
 
     def of(given: Any, path: tuple[int, ...] = ()) -> Iterator[tuple[Argument, tuple[int, ...]]]:
         values = (one for one in leaves(given) if isinstance(one, Value) and isinstance(one.note, Argument))
@@ -94,7 +94,7 @@ def _taken_by(part: FunctionPart) -> Iterator[tuple[Argument, tuple[int, ...]]]:
 
 
 def _address_of(note: Element) -> Iterator[tuple[int, ...]]:
-    """The paths of what the address of an element is made of."""
+    """Yield the paths of the numbers of an array from which the address of an element follows."""
     kind, axes = note.array.kind, range(len(note.place))
     field = default_manager[kind].get_field_position
     yield (field("data"),)

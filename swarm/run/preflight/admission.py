@@ -10,7 +10,7 @@ from ...files.origin import require_near
 from ...methods import ALL_METHODS
 from ...methods.base import Method, check_surfaces
 from ...motion import Path, parts_of
-from ...motion.given import require_angles
+from ...motion.given import require_angle
 from ...particles import Particles, TiedParticles
 from ...scene import Scene
 from ...sources.ball_places import place_unborn
@@ -117,8 +117,8 @@ def _require_laws_applied(compiled: CompiledScene, method: Method) -> None:
 
 def _require_motions(scene: Scene, until: float) -> None:
     for i, surface in enumerate(scene.surfaces):
-        require_angles(f"surfaces[{i}].motion", surface.motion, until)
         for one in parts_of(surface.motion):
+            require_angle(f"surfaces[{i}].motion", one, until)
             if isinstance(one, Path) and not one.times[0] <= 0.0 <= until <= one.times[-1]:
                 raise SceneError(
                     f"surfaces[{i}].motion.times must cover the run from 0 to {until:g} s, got {one.times[0]:g} to "

@@ -67,7 +67,7 @@ def _require_few_cells(scene: Scene, particles: Particles, options: RunOptions) 
 
 
 def counters_of(scene: Scene, given: tuple[Counter, ...], logs: bool = False) -> Counters | None:
-    """Return the counters as kernels take them, or None without counters; `logs`: their crossings are logged.
+    """Return the records of the counters for kernels, or None without counters; `logs`: their crossings are logged.
 
     `logs` is also true for crossings by steps, which are counted one by one.
 

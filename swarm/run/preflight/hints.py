@@ -54,7 +54,7 @@ def give(task: Task) -> None:
     if task.bodies is None and task.particles.radius is None and len(task.particles):
         # The speed of the fastest particle in a sample.
         some = task.particles.velocity[:, _some(len(task.particles))]
-        fastest = float(np.sqrt((some**2).sum(axis=0).max()))
+        fastest = float(np.sqrt(np.add.reduce(some**2).max()))
         # The speed after a fall through the scene.
         pull = math.hypot(*(task.scene.gravity or (0.0,)))
         speed = math.hypot(fastest, math.sqrt(2.0 * pull * task.scene.finite_size()))

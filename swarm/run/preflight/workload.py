@@ -140,7 +140,7 @@ def _chord(walls: Any, point: NDArray[np.float64], way: NDArray[np.float64]) -> 
 
 
 def _chosen(particles: Particles) -> list[int]:
-    return sorted({round(k * (len(particles) - 1) / (_PARTICLES - 1)) for k in range(_PARTICLES)})
+    return list(dict.fromkeys(round(k * (len(particles) - 1) / (_PARTICLES - 1)) for k in range(_PARTICLES)))
 
 
 def _hit(
