@@ -13,7 +13,7 @@ from .contact.energy import contact_energy
 from .kernel.arrays import scratch
 from .kernel.gravity import potential
 from .kernel.jit import kernel, select
-from .kernel.vector import Vec, column, cross, dot, square, vec
+from .kernel.vector import Vec, column, cross, dot, square, vec, vector_at
 from .scene import Scene
 from .state import CROSSED, Floats, State, is_gone
 from .surfaces.time_of_impact import flights
@@ -162,7 +162,7 @@ def count_escaped(walls, gravity, far, faces, state):
         r, v = column(position, 0, i), column(velocity, 0, i)
         out = square(r) > far * far
         for k in range(faces.shape[0]):
-            n = Vec(faces[k, 0], faces[k, 1], faces[k, 2])
+            n = vector_at(faces, k, 0)
             out |= (dot(n, r) > faces[k, 3]) & (dot(n, v) > 0.0)
         leaves = out or _escapes(state.period, gravity, walls, r, v)
         count += leaves and not is_gone(state, i)

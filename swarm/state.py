@@ -56,18 +56,6 @@ class Contacts(NamedTuple):
     sliding: Floats
 
 
-class Absorbed(NamedTuple):
-    """The particles that walls have absorbed.
-
-    Attributes:
-        time: (N,) the time of the absorption [s], NaN for other particles.
-        wall: (N,) int32, the number of the wall in the scene, -1 for other particles.
-    """
-
-    time: Floats
-    wall: NDArray[np.int32]
-
-
 # The sums over the crossings of a counter: three components of the momentum, the energy, the slowness.
 CROSSED = 5
 
@@ -152,9 +140,9 @@ class State(NamedTuple):
     openings: Any = None  # None, or each `Opening` of the walls
     # If particles are born during the run, or wait on a wall:
     starts: Floats | None = None  # (N,) the time from which each particle flies [s]
-    # If a wall may absorb particles, as in `Absorbed`:
-    absorbed_time: Floats | None = None
-    absorbed_wall: NDArray[np.int32] | None = None
+    # If a wall may absorb particles:
+    absorbed_time: Floats | None = None  # (N,) [s], NaN for other particles
+    absorbed_wall: NDArray[np.int32] | None = None  # (N,) the number of the wall in the scene, -1 for other particles
 
     crossed: Crossed | None = None  # if the run has counters
     # If balls are born during the run:
@@ -166,12 +154,6 @@ class State(NamedTuple):
     # If contacts take time, and laws of walls act at their ends:
     pressed: Floats | None = None  # (walls, N) the impulse of each contact since friction last acted, per mass [m/s]
     rubbed: Floats | None = None  # (walls, N) the impulse of the same contact before that, per mass [m/s]
-
-    @property
-    def absorbed(self) -> Any:
-        """The `Absorbed`, or None if no wall absorbs particles."""
-        time, wall = self.absorbed_time, self.absorbed_wall
-        return None if time is None or wall is None else Absorbed(time, wall)
 
     @property
     def radius(self) -> Floats | None:
@@ -232,6 +214,11 @@ def _of(value: Any, some: NDArray[np.bool_], n: int) -> Any:
 def is_gone(state, i):
     """Whether particle i has left the walls: it has passed an opening, or was absorbed."""
     escaped = False if state.escape_time is None else not math.isnan(state.escape_time[i])
-    if state.absorbed is None:
+    if state.absorbed_time is None:
         return escaped
-    return (not math.isnan(state.absorbed.time[i])) | escaped
+    return (not math.isnan(state.absorbed_time[i])) | escaped
+
+
+def absorb(books, i, wall, time):
+    """Book that a wall of the scene absorbs particle i, or body i, at a time [s]."""
+    books.absorbed_time[i], books.absorbed_wall[i] = time, np.int32(wall)

@@ -10,8 +10,8 @@ from same_bits import require_same
 from test_sessions import stopped_at
 
 import swarm
+from swarm.kernel.random import Seeding
 from swarm.run.engine import Run
-from swarm.run.starting_state import Seeding
 from swarm.run.tally import Watched
 from swarm.surfaces.counter import checked_counters
 from swarm.surfaces.instant import side_of

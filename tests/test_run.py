@@ -13,6 +13,7 @@ from swarm.common.status import Status
 from swarm.contact import events
 from swarm.kernel.arrays import next_of
 from swarm.kernel.jit import kernel
+from swarm.kernel.random import UNSEEDED
 from swarm.lanes import lane_arrays as lanes
 from swarm.lanes.block import NEVER
 from swarm.lanes.share import Draws, Share, ThreadPlace
@@ -52,7 +53,7 @@ def test_every_particle_that_is_not_done_follows_once(n, size):
     phase = np.where(np.random.default_rng(n).random(n) < 0.4, events.ARRIVED, events.FLYING).astype(np.int8)
     number, pending = -(-n // size), np.zeros(events.PHASES, np.int64)
     draws = Draws(np.zeros(1, np.int64), np.arange(number), size, np.empty(number, np.int64))
-    share = Share(None, phase, pending, lanes.none_halted(1), draws, np.zeros(1, np.int64), 1.0, 0, 0, 1.0)
+    share = Share(None, phase, pending, lanes.none_halted(1), draws, np.zeros(1, np.int64), 1.0, UNSEEDED, 1.0)
     place, found = share.following(events.FLYING, ThreadPlace(0, 0, 0)), []
     while not place.is_end():
         found.append(place.i)

@@ -9,6 +9,7 @@ from swarm.events.balls_run import CollidingRun
 from swarm.events.heavy_run import HeavyRun
 from swarm.events.walls_run import ReactingRun
 from swarm.grains.grains_run import GrainsRun
+from swarm.kernel.random import seeding_of
 from swarm.run.base import BaseRun
 from swarm.run.doors import DoorRun
 from swarm.run.engine import Run
@@ -16,7 +17,6 @@ from swarm.run.machine import run_of
 from swarm.run.observed import balance
 from swarm.run.options import RunOptions
 from swarm.run.preflight.admission import task_of
-from swarm.run.starting_state import Seeding
 from swarm.run.tally import Watched, tally_of
 
 BOX, DOWN, ACROSS = swarm.Box((1.0, 1.0, 1.0)), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)
@@ -147,5 +147,5 @@ def test_the_balance_is_the_energy_without_what_walls_gave():
 
 @pytest.mark.parametrize("seed", [0, 1, 2**63 - 1, 2**63, 2**64 - 1])
 def test_a_seed_is_the_signed_number_of_the_same_bits(seed):
-    signed = Seeding(seed).signed()
-    assert np.int64(signed).view(np.uint64) == seed
+    seeding = seeding_of(seed)
+    assert np.int64(seeding.seed).view(np.uint64) == seeding.unsigned() == seed

@@ -9,9 +9,9 @@ from test_impacts import BALLS, DOWN, LISTED, SCENES, SPHERE, table_of
 from test_sessions import stopped_at
 
 import swarm
+from swarm.kernel.random import Seeding
 from swarm.lanes.watching.counts import PARTS, Sums
 from swarm.run.engine import Run
-from swarm.run.starting_state import Seeding
 from swarm.run.tally import Tally, Units, Watched, value_of
 
 # What slides takes a third of the steps of the default.

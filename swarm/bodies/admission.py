@@ -19,7 +19,7 @@ from ..run.preflight.starts import require_inside
 from ..scene import Scene
 from ..surfaces.plane import require_start
 from ..surfaces.shapes.slab import Slab
-from ..surfaces.surface import Surface
+from ..surfaces.surface import Surface, named
 from . import covering
 from .births import with_born
 from .body import Body, squares_between
@@ -126,9 +126,9 @@ def warn_of_passing(scene: Scene, body: Body) -> None:
     wanted = allowed if surface.has_edges else math.sqrt(allowed * (2.0 * size - allowed))
     what = "pass through the body" if gap >= size else f"enter the body by {depth:.2g} m"
     _LOG.warning(
-        "surfaces[%d] (%s) can %s without an impact: only contact points touch walls, and a face of the body has "
+        "%s can %s without an impact: only contact points touch walls, and a face of the body has "
         "places %.2g m away from them; give it more of them: contacts = %.1g [m] of rigid, or a finer mesh of elastic",
-        i, type(surface).__name__, what, gap, _rounded(wanted / _GAP),
+        named(i, surface), what, gap, _rounded(wanted / _GAP),
     )  # fmt: skip
 
 

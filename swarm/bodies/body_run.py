@@ -13,6 +13,7 @@ from ..compiled_scene import CompiledScene
 from ..contact.laws import NONE, Laws
 from ..errors import RunError
 from ..kernel.limits import SOLVED_PLACE
+from ..kernel.random import UNSEEDED, Seeding
 from ..methods.base import Method
 from ..motion import pose
 from ..observables import CHUNK
@@ -21,8 +22,7 @@ from ..run.base import BaseRun
 from ..run.doors import comers
 from ..run.impacts import ThreadLog
 from ..run.observed import gone_of
-from ..run.preflight.counting import counters_of, crossed_of
-from ..run.starting_state import UNSEEDED, Seeding
+from ..run.preflight.counting import Counting
 from ..run.tally import UNWATCHED, Watched
 from ..run.tiers import Tier
 from ..scene import Scene
@@ -70,9 +70,8 @@ class BodyRun(BaseRun):
             len(compiled.numbering.surfaces_of_rows) + len(own),
         )
         laws = self._touching.laws or NONE
-        self._counted_by, self._counters = watched.counters, counters_of(scene, watched.counters, logs=True)
-        counters, opens = self._counters, self._walls[2] is not None
-        crossed = None if counters is None else crossed_of(counters, self._counted_by, scene, bodies.centers())
+        self._counting, opens = Counting(scene, watched.counters), self._walls[2] is not None
+        crossed = self._counting.crossed(bodies.centers())
         self._bodies = _state_of(bodies, particles, (rows, walls), opens, scene.moves(), laws, crossed)
         none = np.zeros(0)
         # The part of the state that files take.
@@ -114,7 +113,7 @@ class BodyRun(BaseRun):
         self._led_start, self._scale = np.zeros((2, n))
         self._energy_start = self._bodies.energy
         if bodies.births is not None:
-            self._feed = BodyFeed(scene, bodies, seeding.seed, self._energy_of)
+            self._feed = BodyFeed(scene, bodies, seeding.unsigned(), self._energy_of)
             self.state = self.state._replace(born_time=np.tile(self._feed.born_time, points))
         for some, r, v in self._blocks():
             self._led_start[some] = self._energies.led(r, v)
@@ -128,8 +127,7 @@ class BodyRun(BaseRun):
     def _arguments(self, thread: int, ticket: Any, page: ThreadLog | None = None) -> tuple[Any, ...]:
         """Return the arguments of `advance_bodies`, with the counts of a thread, and its page of the log."""
         counts = None if self._tally is None else self._tally.of_thread(thread)
-        watchers = self._watchers(self._counters)._replace(counts=counts)
-        watchers = watchers if page is None else page.watched_by(watchers)
+        watchers = self._watchers(page)._replace(counts=counts)
         both, bodies = (self._ties, self._touching), self._bodies._replace(watchers=watchers)
         return both, self._walls, self._rule, bodies, ticket, self._size, self._watch.passes
 
@@ -168,10 +166,7 @@ class BodyRun(BaseRun):
             bodies.position[..., some], bodies.velocity[..., some] = r, v
             bodies.remaining[some] = moment - time
             self._begin_books(some, r, v)
-            if self._counters is not None:
-                centers = self._body.center_of(r)
-                sides = crossed_of(self._counters, self._counted_by, self._scene, centers).side
-                bodies.crossed.side[:, some] = sides
+            self._counting.begin(bodies.crossed, some, self._body.center_of(r))
 
     def _reach(self, moment: float) -> None:
         """Set the walls, those with the body's own, and the openings of the frame, or its piece, up to a moment [s]."""
@@ -208,7 +203,7 @@ class BodyRun(BaseRun):
             ticket = np.zeros(1, np.int64)
             calls = [self._arguments(thread, ticket, page) for thread, page in enumerate(pages)]
             status, body = max(self._called(advance_bodies, calls, latest))
-            for page in (one for one in pages if one is not None):
+            for page in pages:
                 page.turn() if status == Status.LOG_FULL else page.close()
         return status, body
 
@@ -283,7 +278,7 @@ class BodyRun(BaseRun):
         sums, errors, depths = zip(*(self._sums_of(*block, moment) for block in self._blocks()), strict=True)
         self._sums = np.ascontiguousarray(np.array(sums).T)
         own, cavities = len(self._own), len(self._body.cavities)
-        counters = 0 if self._counters is None else len(self._counters.each)
+        counters = 0 if self._counting.counters is None else len(self._counting.counters.each)
         self._seen = {
             **gone_of(self.state._replace(escape_time=None), 0, self._surfaces_of_walls, surfaces),
             **summed(self._sums, self._owners, surfaces, (own, cavities, bodies.heat is not None), counters),

@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from ..compiled_scene import CompiledScene
-from ..contact.wall_impact import RandomSource
+from ..kernel.random import UNSEEDED, Seeding
 from ..methods import AugmentedLagrangian
 from ..methods.base import Method
-from ..run.starting_state import UNSEEDED, Seeding
 from ..state import Floats
 from ..surfaces.surface import Surface
 from . import algebra
@@ -108,8 +107,8 @@ def touching_of(body: Body, ties: Ties, compiled: CompiledScene, seeding: Seedin
     restitution = np.array([surface.restitution for surface in surfaces])
     friction = np.array([surface.friction for surface in surfaces])
     laws = compiled.laws if compiled.laws is not None and compiled.laws.send_off else None
-    random = None if laws is None else RandomSource(seeding.signed(), seeding.first)
     return Touching(
         b, plain, algebra.product(b, ties.inverse_mass), len(body.contacts), len(of_walls), len(body.guides),
-        restitution, friction, laws is not None or bool(((restitution < 1.0) | (friction > 0.0)).any()), laws, random,
+        restitution, friction, laws is not None or bool(((restitution < 1.0) | (friction > 0.0)).any()), laws,
+        None if laws is None else seeding,
     )  # fmt: skip

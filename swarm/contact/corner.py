@@ -9,7 +9,7 @@ tested for one that carries. Uzawa's loop, uzawa.py, is around these sweeps, wit
 from ..kernel.jit import outlined
 from ..kernel.limits import EPSILON
 from ..kernel.record import Record
-from ..kernel.vector import ZERO, Vec, dot, largest, norm
+from ..kernel.vector import ZERO, Vec, dot, largest, norm, vector_at
 from . import impulse as contact_impulse
 from .discrete_gradient import reaction
 from .impulse import Step
@@ -48,16 +48,12 @@ def hold(form, law, multipliers, walls, step, reactions):
     return CornerEnd(r, False)
 
 
-def _reaction_of(reactions, k):
-    return Vec(reactions[k, 0], reactions[k, 1], reactions[k, 2])
-
-
 @outlined
 def total(reactions):
     """The sum of the reactions of all walls."""
     found = ZERO
     for k in range(reactions.shape[0]):
-        found = found + _reaction_of(reactions, k)
+        found = found + vector_at(reactions, k, 0)
     return found
 
 
@@ -65,7 +61,7 @@ def _size_of(reactions):
     """The sum of the sizes of the reactions of all walls."""
     found = 0.0
     for k in range(reactions.shape[0]):
-        found += largest(_reaction_of(reactions, k))
+        found += largest(vector_at(reactions, k, 0))
     return found
 
 
@@ -88,7 +84,7 @@ def _sweep(walls, form, law, multipliers, step, reactions):
 def add_reaction_impulses(reactions, h, impulse, lane):
     """Add the impulse per mass of each wall in a step of length h, |2/h reaction|, to impulse[wall, lane]."""
     for k in range(reactions.shape[0]):
-        impulse[k, lane] += 2.0 / h * norm(_reaction_of(reactions, k))
+        impulse[k, lane] += 2.0 / h * norm(vector_at(reactions, k, 0))
 
 
 @outlined
@@ -101,7 +97,7 @@ def add_reaction_works(moving, walls, factor, reactions, ends, impulse, lane):
     if moving is None:
         return found
     for k, wall in reversed(tuple(enumerate(walls.each))):
-        work = factor * dot(_reaction_of(reactions, k), wall.swept(*ends))
+        work = factor * dot(vector_at(reactions, k, 0), wall.swept(*ends))
         impulse[reactions.shape[0] + k, lane] += work
         found = work + found
     return found

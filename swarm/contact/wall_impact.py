@@ -10,7 +10,7 @@ from typing import Any
 from ..kernel.arrays import index
 from ..kernel.gravity import potential
 from ..kernel.jit import select
-from ..kernel.random import Stream, flux_maxwellian, uniforms
+from ..kernel.random import flux_maxwellian, uniforms
 from ..kernel.record import Record
 from ..kernel.vector import ZERO, Vec, dot, either, square
 from .laws import KEPT
@@ -38,15 +38,19 @@ class Arriving(Record):
         return self.r if self.touch is None else self.touch
 
 
-class RandomSource(Record):
-    """The random numbers of the walls that send particles off."""
+class Facing(Record):
+    """A wall at the place of an impact, as its laws take it: its normal, and its velocity or None if no wall moves."""
 
-    seed: Any
-    first: Any  # the number of the first particle of this run
+    n: Vec
+    u: Any = None
 
-    def of_impact(self, i, number, laws):
-        """Return the random numbers of an impact of particle i with the `number` of impacts before it."""
-        return Stream(self.seed, self.first + i, number, 0, laws.across)
+    def unit_normal(self, _wall, _r):
+        """Return the normal."""
+        return self.n
+
+    def velocity(self, _wall, _r):
+        """Return the velocity."""
+        return self.u
 
 
 def impact_on_wall(laws, walls, gravity, wall, arriving, random):

@@ -9,7 +9,7 @@ from .. import observables
 from ..ball_numbers import BallNumbers
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
-from ..contact.wall_impact import RandomSource
+from ..kernel.random import Seeding
 from ..methods.base import Method
 from ..particles import Particles
 from ..run import failures
@@ -17,8 +17,7 @@ from ..run.base import Arrays, BaseRun
 from ..run.doors import comers, require_free
 from ..run.feeding import Feed, There
 from ..run.impacts import ThreadLog
-from ..run.preflight.counting import counters_of, crossed_of, with_counters
-from ..run.starting_state import Seeding
+from ..run.preflight.counting import Counting
 from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..scene import Scene
@@ -58,6 +57,7 @@ class CollidingRun(BaseRun):
         # The number of collisions of each ball is in its rows.
         met, rounds = self._flock.tag.reshape(n, WHOLES)[:, MET], self._flock.link.reshape(n, WHOLES)[:, FACE]
         balls = Balls(particles.radius, met, np.zeros(1), particles.spin, rounds)
+        self._counting = Counting(scene, watched.counters)
         # The energies of balls are not kept.
         unused = np.broadcast_to(0.0, n)
         # The times of flights are those of their start, so that frames have no influence on the motion.
@@ -65,25 +65,22 @@ class CollidingRun(BaseRun):
             particles.position, particles.velocity, particles.mass, *2 * (unused,),
             np.zeros(n, np.int64), np.zeros((2 * rows if scene.moves() else rows, 1)), np.zeros(n if loses else 0),
             None, None, np.zeros((rows, 1)) if any(one.give_heat for one in every) else None,
-            image=particles.image, period=compiled.cell(), balls=balls,
-            openings=openings, **none_left(n, openings is not None, ends),
+            image=particles.image, period=compiled.cell(), balls=balls, openings=openings,
+            crossed=self._counting.crossed(particles.position), **none_left(n, openings is not None, ends),
         )  # fmt: skip
         state, self._balls, gates = self.state, balls, None
-        feed = None if particles.births is None else Feed(scene, particles, seeding.seed, self._is_clear)
+        feed = None if particles.births is None else Feed(scene, particles, seeding.unsigned(), self._is_clear)
         if openings is not None or ends or feed is not None:
             gates = Gates(openings, state.escape_time, state.absorbed_time, state.absorbed_wall)
         box = box._replace(window=None if self._windows is None else self._windows.numbers, gates=gates)
         self._box = self._with_heavy(compiled, box)
         if any(one.send_off for one in every):
-            self._box = self._box._replace(source=RandomSource(seeding.signed(), seeding.first))
+            self._box = self._box._replace(seeding=seeding)
         super().__init__(compiled, method, n, threads, Tier(compile, self._box, n), seeding, watched)
         if feed is not None:
             self._feed, self.state = feed, self.state._replace(born_time=feed.born_time)
-        self._counted = watched.counters
-        counters = counters_of(scene, watched.counters, logs=True)
-        self.state = state = with_counters(self.state, counters, watched.counters, scene)
-        self._box = self._box._replace(watchers=self._watchers(counters))
-        if counters is not None:
+        self._box = self._box._replace(watchers=self._watchers())
+        if state.crossed is not None:
             self._flock = self._flock._replace(followed=np.zeros(n))
         self._books = CollisionTotals(
             state.impulse, state.dissipated, state.impacts, balls.virial, state.image, state.heat, state.mass,
@@ -115,34 +112,33 @@ class CollidingRun(BaseRun):
             stop = moment if self._feed is None else min(moment, self._feed.next())
             rule = CollisionRule(stop, self._watch.passes)
             status, ball = self._call(
-                events.take, self._with_log(page), self._flock, self._books, self._clock, rule, latest=latest
+                events.take, self._watched(page), self._flock, self._books, self._clock, rule, latest=latest
             )
-            if page is not None and status == Status.LOG_FULL:
+            if status == Status.LOG_FULL:
                 page.turn()
             elif status == Status.LEASE_ENDED:
                 self._next_window()
             elif status == Status.DONE and self._feed is not None and self._feed.next() <= moment:
                 self._feed_in(stop)
                 status = Status.LEASE_ENDED
-        if status == Status.DONE and self._box.watchers.counters is not None:
+        if status == Status.DONE and self.state.crossed is not None:
             self._follow(moment, page)
-        if page is not None:
-            page.close()
+        page.close()
         self._rest_was_reported = self._rest_was_reported or warn_of_rest(self._box, self._clock)
         return status, ball
 
-    def _with_log(self, page: ThreadLog | None) -> Any:
-        """The `Domain` of the balls, with the log to be filled."""
-        return self._box if page is None else self._box._replace(watchers=page.watched_by(self._box.watchers))
+    def _watched(self, page: ThreadLog) -> Any:
+        """The `Domain` of the balls, with the watchers of the calling thread."""
+        return self._box._replace(watchers=self._watchers(page))
 
-    def _follow(self, moment: float, page: ThreadLog | None) -> None:
+    def _follow(self, moment: float, page: ThreadLog) -> None:
         """Count the crossings of all flights until the end of a frame."""
         followed, now = 0, self._since(moment)
         while followed < self.state.mass.size:
             followed = self._call(
-                events.follow_all, self._with_log(page), self._flock, self._books, self._clock, now, followed
+                events.follow_all, self._watched(page), self._flock, self._books, self._clock, now, followed
             )
-            if page is not None and followed < self.state.mass.size:
+            if followed < self.state.mass.size:
                 page.turn()
 
     def _feed_in(self, moment: float) -> None:
@@ -153,9 +149,7 @@ class CollidingRun(BaseRun):
         for i, position, velocity in zip(born.number.tolist(), born.position.T, born.velocity.T, strict=True):
             self.state.position[:, i], self.state.velocity[:, i] = position, velocity
             come(self._flock, self._box.grid, i, now, position, velocity)
-            if (crossed := self.state.crossed) is not None:
-                counters = self._box.watchers.counters
-                crossed.side[:, i] = crossed_of(counters, self._counted, self._scene, position[:, None]).side[:, 0]
+            self._counting.begin(self.state.crossed, [i], position[:, None])
             self._call(events.welcome, self._box, self._flock, i, now)
 
     def _show(self, moment: float) -> None:
@@ -226,7 +220,7 @@ class CollidingRun(BaseRun):
             yield events.welcome, (box, flock, 0, 0.0)
         yield events.take, (box, flock, self._books, self._clock, CollisionRule(0.0, self._watch.passes))
         yield events.show, (box, flock, self.state, 0.0, *part)
-        if box.watchers.counters is not None:
+        if self.state.crossed is not None:
             yield events.follow_all, (box, flock, self._books, self._clock, 0.0, 0)
         if self._windows is not None:
             yield events.next_epoch, (flock, self._clock)
@@ -276,5 +270,3 @@ class CollidingRun(BaseRun):
         super().restore(arrays, cut_short)
         if self._windows is not None:
             self._set_window()
-        if self._tally is not None:
-            self._box = self._box._replace(watchers=self._watchers(self._box.watchers.counters))

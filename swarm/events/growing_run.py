@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..kernel.jit import select
+from ..kernel.random import Seeding
 from ..kernel.record import Record
 from ..kernel.vector import dot, square
 from ..methods import Impact
 from ..particles import Particles
-from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..scene import Scene
 from ..state import Floats

@@ -8,9 +8,9 @@ import numpy as np
 from .. import observables
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
-from ..contact.wall_impact import RandomSource
 from ..kernel.gravity import potential
 from ..kernel.heap import Heap
+from ..kernel.random import Seeding
 from ..kernel.vector import vec
 from ..methods.base import Method
 from ..observables import CHUNK
@@ -20,9 +20,8 @@ from ..run.base import Arrays, BaseRun
 from ..run.doors import comers, require_free
 from ..run.impacts import ThreadLog
 from ..run.observed import Observed, observed_of
-from ..run.preflight.counting import counters_of, with_counters
+from ..run.preflight.counting import Counting
 from ..run.present import Presence
-from ..run.starting_state import Seeding
 from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..state import State, none_left
@@ -46,29 +45,29 @@ class ReactingRun(BaseRun):
     ) -> None:  # fmt: skip
         n, walls, gravity = len(particles), len(compiled.numbering.surfaces_of_rows), compiled.scene.pull()
         energy = 0.5 * (particles.velocity**2).sum(axis=0) + potential(gravity, vec(particles.position))
-        self._source = RandomSource(seeding.signed(), seeding.first)
+        self._seeding = seeding
         self._scenery = self._scenery_of(compiled, 0.0)
         births, every = particles.births, self._scenery.each_laws()
         heat = np.zeros((walls, n)) if any(laws.give_heat for laws in every) else None
         ends = any(laws.may_end for laws in every)
+        self._counting = Counting(compiled.scene, watched.counters)
         starts = births.time.copy() if births is not None else np.zeros(n) if ends else None
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.asarray(energy) + np.zeros(n), np.zeros(n),
             np.zeros(n, np.int64), np.zeros((2 * walls, n)), np.zeros(n), None, None, heat, starts=starts,
-            **none_left(n, compiled.openings() is not None, ends),
+            crossed=self._counting.crossed(particles.position), **none_left(n, compiled.openings() is not None, ends),
         )  # fmt: skip
         self._present = Presence(births, self.state, CHUNK)
         tier = Tier(compile, (self._scenery, gravity), n)
         super().__init__(compiled, method, n, threads, tier, seeding, watched)
-        counters = counters_of(self._scene, watched.counters, logs=True)
-        self.state = state = with_counters(self.state, counters, watched.counters, self._scene)
-        number = np.arange(n)
+        state, number = self.state, np.arange(n)
         self._queue = Queue(
             state.position, state.velocity, state.mass, state.energy, state.impulse, state.dissipated, state.impacts,
             np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.full(n, events.NONE), np.zeros(n, bool),
             np.zeros(n, np.int64), np.zeros(n, bool), np.zeros(n, np.int64),
-            Heap(np.zeros(n), number.copy(), number.copy()), state.heat, state.crossed, self._watchers(counters),
-            absorbed=state.absorbed, escape_time=state.escape_time, starts=state.starts,
+            Heap(np.zeros(n), number.copy(), number.copy()), state.heat, state.crossed, self._watchers(),
+            absorbed_time=state.absorbed_time, absorbed_wall=state.absorbed_wall, escape_time=state.escape_time,
+            starts=state.starts,
         )  # fmt: skip
         self._instants = self._scene.instants if self._scene.has_doors() else None
         self._freedoms = freedoms_of(compiled, particles.velocity)
@@ -79,7 +78,7 @@ class ReactingRun(BaseRun):
     def _scenery_of(self, compiled: CompiledScene, moment: float) -> SceneWalls:
         """The walls in the frame that ends at a moment [s], with random numbers if laws send particles off."""
         found = scenery_of(compiled, moment)
-        return found._replace(source=self._source) if any(laws.send_off for laws in found.each_laws()) else found
+        return found._replace(seeding=self._seeding) if any(laws.send_off for laws in found.each_laws()) else found
 
     def _prepare(self, span: float, moment: float) -> None:
         self._scenery = self._scenery_of(self._compiled, moment)
@@ -101,25 +100,23 @@ class ReactingRun(BaseRun):
             bring_walls(self._scenery, self._freedoms, span)
             self._clock[events.BEFORE] += span
             self._clock[NOW] = 0.0
-        if page is not None:
-            page.close()
+        page.close()
         return status, particle
 
-    def _arrive(self, rule: ReactionRule, page: ThreadLog | None) -> None:
+    def _arrive(self, rule: ReactionRule, page: ThreadLog) -> None:
         """Bring all particles to the end of the frame, in one thread if there is a log."""
         last, first = len(self.state.mass), 0
-        if page is None:
+        if page.log is None:
             self._in_parts(events.arrive, self._scenery, self._queue, rule, last=last)
             return
-        while (first := self._call(events.arrive, self._scenery, self._with_log(page), rule, first, last)) < last:
+        while (first := self._call(events.arrive, self._scenery, self._watched(page), rule, first, last)) < last:
             page.turn()
 
-    def _with_log(self, page: ThreadLog | None) -> Queue:
-        """The queue, with the log to be filled."""
-        queue = self._queue
-        return queue if page is None else queue._replace(watchers=page.watched_by(queue.watchers))
+    def _watched(self, page: ThreadLog | None = None) -> Queue:
+        """The queue, with the watchers of the calling thread."""
+        return self._queue._replace(watchers=self._watchers(page))
 
-    def _take(self, rule: ReactionRule, page: ThreadLog | None, latest: float) -> tuple[int, int]:
+    def _take(self, rule: ReactionRule, page: ThreadLog, latest: float) -> tuple[int, int]:
         """Make predictions and take events until the end of the frame or a halt; return the status and the particle."""
         leases = 0
         while self._predict(rule, latest) and leases < self._watch.passes[0]:
@@ -127,7 +124,7 @@ class ReactingRun(BaseRun):
             status, particle = int(Status.LOG_FULL), 0
             while status == Status.LOG_FULL:
                 status, particle = self._call(events.take, *self._moving(rule, page), latest=latest)
-                if status == Status.LOG_FULL and page is not None:
+                if status == Status.LOG_FULL:
                     page.turn()
             if status != Status.LEASE_ENDED:
                 return status, particle
@@ -163,7 +160,7 @@ class ReactingRun(BaseRun):
 
     def _moving(self, rule: ReactionRule, page: ThreadLog | None = None) -> tuple[Any, ...]:
         """Arguments of the kernels that move particles and walls."""
-        return self._scenery, self._freedoms, self._with_log(page), self._clock, rule
+        return self._scenery, self._freedoms, self._watched(page), self._clock, rule
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
         before, place = moment - span, self.state.position[:, item]
@@ -198,13 +195,10 @@ class ReactingRun(BaseRun):
     def _arrays(self) -> dict[str, Any]:
         queue: Any = self._queue
         return {
-            **queue._replace(heap=None, mass=None, watchers=None, image=None, absorbed=None)._asdict(),
-            "absorbed_time": self.state.absorbed_time, "absorbed_wall": self.state.absorbed_wall,
+            **queue._replace(heap=None, mass=None, watchers=None, image=None)._asdict(),
             "walls": self._freedoms, "key": queue.heap.key, "clock": self._clock,
         }  # fmt: skip
 
     def restore(self, arrays: Arrays, cut_short: bool) -> None:
         self.observe()
         super().restore(arrays, cut_short)
-        if self._tally is not None:
-            self._queue = self._queue._replace(watchers=self._watchers(self._queue.watchers.counters))

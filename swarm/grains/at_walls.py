@@ -4,7 +4,7 @@ import math
 
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
-from ..kernel.vector import ZERO, dot, square
+from ..kernel.vector import ZERO, dot, set_vector, square, vector_at
 from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field
 from . import grain_arrays as col
@@ -21,7 +21,7 @@ from .contacts import (
     weight_of,
     worse,
 )
-from .grain_arrays import OfWall, set_vector, vector_at
+from .grain_arrays import OfWall
 from .heavy_walls import ease_along, note_eases, react, rest_of
 from .vessel import met
 

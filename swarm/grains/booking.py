@@ -8,11 +8,10 @@ from ..contact.wall_impact import give_work
 from ..kernel.arrays import index, unwritten
 from ..kernel.jit import Array, outlined
 from ..kernel.lines import LANES
-from ..kernel.vector import column, dot, norm
+from ..kernel.vector import column, dot, norm, set_vector, vector_at
 from . import grain_arrays as col
 from .at_walls import step_at_wall
 from .contacts import closing, worse
-from .grain_arrays import set_vector, vector_at
 from .heavy_walls import is_heavy
 from .lanes_of_pairs import (
     balls_of,

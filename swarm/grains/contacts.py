@@ -14,10 +14,9 @@ from typing import Any
 from ..kernel.arrays import index
 from ..kernel.jit import outlined, select
 from ..kernel.record import Record
-from ..kernel.vector import absolute, dot, square, total
+from ..kernel.vector import absolute, dot, set_vector, square, total, vector_at
 from . import grain_arrays as col
 from .cell import nearest
-from .grain_arrays import set_vector, vector_at
 
 _TINY = 1e-300
 # The speed to which changes at a contact are relative is no less than this part of the velocities. Their round-off is

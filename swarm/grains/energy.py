@@ -6,10 +6,9 @@ import numpy as np
 
 from ..kernel.arrays import index
 from ..kernel.jit import long_kernel, outlined
-from ..kernel.vector import norm
+from ..kernel.vector import norm, vector_at
 from . import grain_arrays as col
 from .contacts import apart
-from .grain_arrays import vector_at
 from .vessel import met
 
 

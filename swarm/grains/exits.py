@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
-from ..kernel.vector import norm
+from ..kernel.vector import norm, vector_at
 from ..lanes.watching.log import Struck
 from ..surfaces.periodic.period import into
 from ..surfaces.presence.openings import is_open
 from . import grain_arrays as col
 from .contacts import apart, move_of
-from .grain_arrays import vector_at
 from .heavy_walls import place_on
 from .vessel import met, met_member
 

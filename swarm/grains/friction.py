@@ -17,12 +17,12 @@ from ..contact.wall_impact import give_work
 from ..kernel.arrays import index
 from ..kernel.jit import outlined, select
 from ..kernel.limits import EPSILON
-from ..kernel.vector import ZERO, cross, dot, square
+from ..kernel.vector import ZERO, cross, dot, set_vector, square, vector_at
 from ..surfaces.in_motion.posed import Posed
 from . import grain_arrays as col
 from .at_walls import press_at_wall, step_at_wall, velocity_at_end
 from .contacts import change_of, is_due, size_of, stir, worse
-from .grain_arrays import ROUNDNESS, OfWall, set_vector, vector_at
+from .grain_arrays import ROUNDNESS, OfWall
 from .heavy_walls import ease_across, is_heavy, now, react
 from .vessel import gives_work, met
 

@@ -12,7 +12,7 @@ from ..kernel.arrays import aligned, aligned_copy, index, spaced
 from ..kernel.jit import Array
 from ..kernel.lines import LANES
 from ..kernel.record import Record
-from ..kernel.vector import Vec, column, put
+from ..kernel.vector import column, put, set_vector, vector_at
 
 # Columns of `Grains.place`: the centre, the round-off lost from it, the radius, 1/mass.
 X, LOST, RADIUS, LIGHTNESS = 0, 3, 6, 7
@@ -166,16 +166,6 @@ class OfPair(Record):
     def set_vector(self, k, a):
         """Store a vector into three columns."""
         put(self.rows, self.q + k, self.lane, a)
-
-
-def vector_at(rows: Any, c: Any, k: Any) -> Vec:
-    """The vector in three columns of a row."""
-    return Vec(rows[c, k], rows[c, k + 1], rows[c, k + 2])
-
-
-def set_vector(rows: Any, c: Any, k: Any, a: Vec) -> None:
-    """Store a vector into three columns of a row."""
-    rows[c, k], rows[c, k + 1], rows[c, k + 2] = a.x, a.y, a.z
 
 
 def grains_of(position: Any, velocity: Any, radius: Any, mass: Any, spin: Any = None) -> Grains:

@@ -12,10 +12,9 @@ from ..ball_numbers import BallNumbers
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
 from ..contact.laws import NONE
-from ..contact.wall_impact import RandomSource
 from ..errors import RunError
 from ..kernel.arrays import aligned_copy
-from ..lanes.watching.log import Log
+from ..kernel.random import Seeding
 from ..lanes.watching.watchers import Followed
 from ..methods import Penalty
 from ..methods.base import Method
@@ -24,9 +23,9 @@ from ..particles import Particles
 from ..run.base import OUTSIDE, Arrays, BaseRun
 from ..run.doors import comers, require_free
 from ..run.feeding import Feed, There
+from ..run.impacts import ThreadLog
 from ..run.observed import observed_of
-from ..run.preflight.counting import counters_of, crossed_of, with_counters
-from ..run.starting_state import Seeding
+from ..run.preflight.counting import Counting
 from ..run.tally import Watched
 from ..run.tiers import Tier
 from ..state import Balls, Floats, State, none_left
@@ -67,14 +66,15 @@ class GrainsRun(BaseRun):
         scene, n, walls = compiled.scene, len(particles), len(compiled.numbering.surfaces_of_rows)
         radius = particles.radius
         assert radius is not None
-        counters = counters_of(scene, watched.counters, logs=True)
+        self._counting = Counting(scene, watched.counters)
+        counters = self._counting.counters
         laws = compiled.laws or NONE
         holds = True if laws.may_wait else None
         self._matter = matter_of(compiled, method, radius)._replace(counters=counters, holds=holds)
         rubs, spin = self._matter.rubs, particles.spin
         if spin is None and rubs:
             spin = np.zeros((3, n))
-        feed = None if particles.births is None else Feed(scene, particles, seeding.seed, self._is_clear)
+        feed = None if particles.births is None else Feed(scene, particles, seeding.unsigned(), self._is_clear)
         balls = Balls(radius, np.zeros(n, np.int64), np.zeros(1), spin)
         openings, ends = self._matter.openings, laws.may_end
         # The energy that contacts store with a wall is lost when the wall becomes absent.
@@ -83,8 +83,8 @@ class GrainsRun(BaseRun):
         self.state = State(
             particles.position, particles.velocity, particles.mass, np.zeros(n), np.zeros(n), np.zeros(n, np.int64),
             np.zeros((walls * (2 if scene.moves() else 1), n)), np.zeros(n if loses else 0), None,
-            heat=np.zeros((walls, n)) if laws.give_heat else None, balls=balls,
-            openings=openings, **none_left(n, openings is not None, ends),
+            heat=np.zeros((walls, n)) if laws.give_heat else None, balls=balls, openings=openings,
+            crossed=self._counting.crossed(particles.position), **none_left(n, openings is not None, ends),
         )  # fmt: skip
         if particles.image is not None:
             self.state = self.state._replace(image=particles.image, period=compiled.cell())
@@ -96,8 +96,7 @@ class GrainsRun(BaseRun):
         # The energy that contacts with walls stored before the current instant [J], and the length of a step [s].
         self._stored_before: NDArray[np.float64] | None = None
         self._step, self._span = self._matter.h, 0.0
-        self._counted = watched.counters
-        self.state = state = with_counters(self.state, counters, watched.counters, scene)
+        state = self.state
         books = ContactTotals(
             balls.collisions,
             state.impacts,
@@ -123,7 +122,7 @@ class GrainsRun(BaseRun):
             self._rows_of(there),
             *self._room(len(there), _PAIRS * n, _AT_WALLS * n, n if self._fields.faces else None), books,
             followed=None if counters is None else followed,
-            sender=Sender(at_ends, RandomSource(seeding.signed(), seeding.first)) if laws.send_off else None,
+            sender=Sender(at_ends, seeding) if laws.send_off else None,
             held=None if holds is None else held_of(state.mass, rubs), heavy=self._heavy,
         )  # fmt: skip
         self._clock = np.zeros(arrays.CLOCK)
@@ -197,9 +196,7 @@ class GrainsRun(BaseRun):
         kept = kept_drags(self._tier.kernel, self._world)
         state = self.state
         state.position[:, born.number], state.velocity[:, born.number] = born.position, born.velocity
-        if state.crossed is not None:
-            sides = crossed_of(self._matter.counters, self._counted, self._scene, born.position).side
-            state.crossed.side[:, born.number] = sides
+        self._counting.begin(state.crossed, born.number, born.position)
         self._world = self._world._replace(grains=arrays.beside(grains, self._rows_of(born.number)))
         self._make_room()
         self._list(kept)
@@ -363,22 +360,21 @@ class GrainsRun(BaseRun):
         while status in (Status.LEASE_ENDED, Status.LOG_FULL) or (status == Status.DONE and stop < steps):
             self._feed_in(span, moment)
             rule = MarchRule(steps, stop := self._stop(span, moment), self._watch.passes, moment)
-            world = self._watched_world(None if page is None else page.log)
+            world = self._watched_world(page)
             status = self._call(march, self._matter, self._walls, world, self._clock, rule, latest=latest)
             if status == Status.LEASE_ENDED:
                 self._list_again()
-            elif page is not None and status == Status.LOG_FULL:
+            elif status == Status.LOG_FULL:
                 page.turn()
-        if page is not None:
-            page.close()
+        page.close()
         if status == Status.DONE:
             # The births at the end of the frame.
             self._feed_in(span, moment)
         return status, 0
 
-    def _watched_world(self, log: Log | None) -> World:
+    def _watched_world(self, page: ThreadLog | None = None) -> World:
         """The world with a log of contacts and with the counts of members of the calling thread."""
-        world, tally = self._world, self._tally
+        world, tally, log = self._world, self._tally, self._log_of(page)
         noting = None if log is None else Noting(log, self.state.period, self._pages())
         world = world._replace(noting=noting, counts=None if tally is None else tally.counts())
         if all(one is None for one in (world.sender, world.noting, world.counts)):
@@ -403,8 +399,8 @@ class GrainsRun(BaseRun):
         yield lists.list_walls, (self._walls, self._fields.faces, world.grains, world.near, 0.0, 0.0)
         if world.near.drag is not None:
             yield carry, (world.grains.number, world.near, room_for(world.near), False)
-        watched = self._watched_world(None if self._impacts is None else self._impacts.example)
-        yield march, (matter, self._walls, watched, self._clock, MarchRule(0.0, 0.0, self._watch.passes, 0.0))
+        rule = MarchRule(0.0, 0.0, self._watch.passes, 0.0)
+        yield march, (matter, self._walls, self._watched_world(), self._clock, rule)
         yield energy.stored, (matter, self._walls, world.grains, world.near)
         if self._instants is not None or matter.openings is not None:
             into = self.state.dissipated

@@ -17,7 +17,7 @@ from ..compiled_scene import CompiledScene
 from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined, select
 from ..kernel.record import Record
-from ..kernel.vector import ZERO, Vec, dot, square, vec
+from ..kernel.vector import ZERO, Vec, dot, set_vector, square, vec, vector_at
 from ..motion import Guide, speed_at_start, unit_axis
 from ..scene import Scene
 from ..state import Floats
@@ -27,7 +27,7 @@ from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field, Following, Walls
 from . import grain_arrays as col
 from .contacts import worse
-from .grain_arrays import Grains, grains_of, set_vector, vector_at
+from .grain_arrays import Grains, grains_of
 
 
 class FreeMotion(Record):

@@ -12,9 +12,8 @@ import numpy as np
 
 from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined
-from ..kernel.vector import ZERO, column, put
+from ..kernel.vector import ZERO, column, put, set_vector, vector_at
 from . import grain_arrays as col
-from .grain_arrays import set_vector, vector_at
 
 # The part of a step by which a step may begin before the end of a wait, and still counts as beginning at it.
 _WHOLE = 1e-6

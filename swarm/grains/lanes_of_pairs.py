@@ -14,7 +14,7 @@ import numpy as np
 from ..kernel.arrays import fetch, index, kept, unwritten
 from ..kernel.jit import is_known, outlined, select
 from ..kernel.lines import FOUR, LANES, add_from_lanes, into_lanes
-from ..kernel.vector import Vec, column, cross, dot, put, square
+from ..kernel.vector import Vec, column, cross, dot, put, square, vector_at
 from . import grain_arrays as col
 from .cell import nearest
 from .contacts import (
@@ -32,7 +32,7 @@ from .contacts import (
     worse,
 )
 from .friction import arm_of, rubbed
-from .grain_arrays import ROUNDNESS, OfPair, vector_at, with_lanes
+from .grain_arrays import ROUNDNESS, OfPair, with_lanes
 
 
 def of_group(touches, g):

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from ..kernel.arrays import index, scratch
 from ..kernel.grid import wrapped
 from ..kernel.jit import Array, long_kernel, outlined
-from ..kernel.vector import square
+from ..kernel.vector import set_vector, square, vector_at
 from ..surfaces.balls.joined_faces import JoinedFaces
 from ..surfaces.in_motion.posed import Posed
 from ..surfaces.walls import Field
 from . import grain_arrays as col
 from .cell import nearest
-from .grain_arrays import set_vector, vector_at
 from .heavy_walls import is_heavy
 from .vessel import list_in_field
 

@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
-from ..kernel.vector import ZERO, norm
+from ..kernel.vector import ZERO, norm, set_vector, vector_at
 from ..lanes.watching.log import Lasted, Log, Struck
 from ..surfaces.periodic.period import into
 from . import grain_arrays as col
 from .at_walls import step_at_wall
 from .contacts import closing
 from .friction import across, faced
-from .grain_arrays import OfWall, set_vector, vector_at
+from .grain_arrays import OfWall
 from .held import velocity_of
 from .lanes_of_pairs import move_in, pair_at
 from .vessel import met_member

@@ -14,14 +14,13 @@ from ..contact.path import members_of
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
 from ..kernel.record import Record
-from ..kernel.vector import norm, square
+from ..kernel.vector import norm, square, vector_at
 from ..surfaces.balls.rounded import part_within
 from ..surfaces.fields.members import member
 from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
 from . import grain_arrays as col
 from .contacts import apart, move_of
-from .grain_arrays import vector_at
 from .heavy_walls import is_heavy, now
 from .vessel import is_of_faces, met, moves
 

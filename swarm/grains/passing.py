@@ -4,11 +4,11 @@ from typing import Any, NamedTuple
 
 from ..kernel.arrays import index
 from ..kernel.jit import Array, outlined
+from ..kernel.vector import vector_at
 from ..lanes.watching.crossings import ParticleMoment
 from ..surfaces.periodic.period import has_left, into
 from . import grain_arrays as col
 from .contacts import move_of
-from .grain_arrays import vector_at
 
 
 class Passing(NamedTuple):

@@ -8,13 +8,13 @@ import numpy as np
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
 from ..kernel.limits import TINY
-from ..kernel.vector import dot, norm, square
+from ..kernel.vector import dot, norm, square, vector_at
 from ..methods import Penalty
 from ..methods.fixed_step import thinnest
 from ..pairs import MOST_PRESSED
+from ..surfaces.surface import named
 from . import grain_arrays as col
 from .contacts import apart
-from .grain_arrays import vector_at
 from .overlaps import BALL, OTHER, SIZE, WALL
 
 
@@ -56,7 +56,7 @@ def sent_wrong(compiled: CompiledScene, world: Any, moment: float) -> str:
     i, surface = int(failed[BALL]), compiled.numbering.surfaces_of_rows[int(failed[WALL])]
     return (
         f"the step at {moment:.9g} s failed at particle {grains.number[i]}: {Status.SENT_WRONG.sentence}, where it "
-        f"left surfaces[{surface}] ({type(compiled.scene.surfaces[surface]).__name__})"
+        f"left {named(surface, compiled.scene.surfaces[surface])}"
     )
 
 
@@ -68,7 +68,7 @@ def passed(compiled: CompiledScene, method: Penalty, matter: Any, world: Any, st
     met = f"particle {grains.number[j]}"
     if wall >= 0:
         surface = compiled.numbering.surfaces_of_rows[wall]
-        met = f"surfaces[{surface}] ({type(compiled.scene.surfaces[surface]).__name__})"
+        met = named(surface, compiled.scene.surfaces[surface])
     begin = f"the step at {moment:.9g} s failed at particle {grains.number[i]}, at ({where}) m: it "
     radii = [grains.place[k, col.RADIUS] for k in (i, j)[: 1 + (wall < 0)]]
     if status == Status.TOO_FAST:

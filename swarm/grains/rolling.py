@@ -10,12 +10,12 @@ a ball rolls on a plane with a deceleration of 5/7 rolling G.
 from ..contact.wall_impact import give_work
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
-from ..kernel.vector import ZERO, dot, square
+from ..kernel.vector import ZERO, dot, set_vector, square, vector_at
 from ..surfaces.in_motion.posed import Posed
 from . import grain_arrays as col
 from .contacts import change_of, size_of, stir, worse
 from .friction import across, rubbed
-from .grain_arrays import ROUNDNESS, OfWall, set_vector, vector_at
+from .grain_arrays import ROUNDNESS, OfWall
 from .lanes_of_pairs import pair_at
 from .vessel import gives_work, met
 

@@ -8,19 +8,17 @@ losses the result is that of `Impact`, whatever the penalty. They act on the cen
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ..common.status import Status
 from ..contact.reflection import given
-from ..contact.wall_impact import Arriving, RandomSource, book_energy, by_law, give_work
+from ..contact.wall_impact import Arriving, Facing, book_energy, by_law, give_work
 from ..kernel.arrays import index
 from ..kernel.jit import outlined
-from ..kernel.record import Record
-from ..kernel.vector import ZERO, Vec, dot, square
+from ..kernel.random import Seeding
+from ..kernel.vector import ZERO, dot, set_vector, square, vector_at
+from ..state import absorb
 from ..surfaces.in_motion.posed import Posed
 from . import grain_arrays as col
 from .at_walls import step_at_wall
-from .grain_arrays import set_vector, vector_at
 from .held import hold
 from .overlaps import BALL, WALL
 from .vessel import gives_work, met_member
@@ -30,22 +28,7 @@ class Sender(NamedTuple):
     """The laws of walls, and the arrays that they need besides the walls."""
 
     laws: Any  # `Laws` without restitution and friction, which act during a contact
-    source: RandomSource
-
-
-class _Facing(Record):
-    """A wall at the end of a contact: its outward normal, and its velocity or None if no wall moves."""
-
-    n: Vec
-    u: Any
-
-    def unit_normal(self, _wall, _r):
-        """The normal."""
-        return self.n
-
-    def velocity(self, _wall, _r):
-        """The velocity."""
-        return self.u
+    seeding: Seeding
 
 
 @outlined
@@ -85,11 +68,11 @@ def _act(wall, own, world, at, time):
         return Status.DONE.value
     one, touches = index(grains.number[i]), world.touches
     member = world.places[number][index(met_member(wall, touches.listed, touches.spans, c, radius, r))]
-    random = sender.source.of_impact(one, books.ended[one], sender.laws)
+    random = sender.seeding.of_impact(one, books.ended[one], sender.laws)
     books.ended[one] += 1
     before, mass = v + 2.0 * away * n, 1.0 / grains.place[i, col.LIGHTNESS]
     arriving = Arriving(r, before, square(before), mass)
-    happens, bounce = by_law(sender.laws, _Facing(n, u), None, float(member), arriving, random)
+    happens, bounce = by_law(sender.laws, Facing(n, u), None, float(member), arriving, random)
     if not happens:
         return Status.DONE.value
     if math.isnan(bounce.v.x):
@@ -108,7 +91,7 @@ def _act(wall, own, world, at, time):
     if world.counts is not None:
         world.counts.give(member, heat, bounce.wait)
     if books.absorbed_time is not None and bounce.wait == math.inf:
-        books.absorbed_time[one], books.absorbed_wall[one] = time, np.int32(member)
+        absorb(books, one, member, time)
         return Status.LEASE_ENDED.value
     if world.held is not None and bounce.wait > 0.0:
         hold(world.held, grains, i, time + bounce.wait)

@@ -12,7 +12,7 @@ from ..common.status import Status
 from ..kernel.arrays import index
 from ..kernel.gravity import accelerated
 from ..kernel.jit import Array, outlined, select, wide_long_kernel
-from ..kernel.vector import ZERO, square
+from ..kernel.vector import ZERO, set_vector, square, vector_at
 from ..lanes.watching.log import is_full
 from . import grain_arrays as col
 from .at_walls import gather_at_wall, push_walls, sweep_wall
@@ -20,7 +20,6 @@ from .booking import book_pairs, book_wall, count_members
 from .contacts import ContactSweep, find_more_pairs, find_pairs, foresee, travel_of, weight_of, worse
 from .exits import let_out, open_wall
 from .friction import book_rubbing, rub_wall, twist_wall
-from .grain_arrays import set_vector, vector_at
 from .heavy_walls import begin_walls, fly_wall, is_heavy, push_back
 from .held import let_go
 from .lanes_of_pairs import group_pairs, push_pairs, rub_pairs, sweep_pairs, twist_pairs

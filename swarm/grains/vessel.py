@@ -15,7 +15,7 @@ from ..kernel.arrays import index
 from ..kernel.grid import block_of, over_entries
 from ..kernel.jit import outlined
 from ..kernel.record import Record
-from ..kernel.vector import Vec, square
+from ..kernel.vector import Vec, square, vector_at
 from ..surfaces.balls.facet import RoundTriangle
 from ..surfaces.contract import Smooth
 from ..surfaces.fields.members import GrownLike, member
@@ -25,7 +25,6 @@ from ..surfaces.rotation import Rotated
 from ..surfaces.walls import Field
 from . import grain_arrays as col
 from .contacts import move_of
-from .grain_arrays import vector_at
 from .heavy_walls import is_heavy
 
 

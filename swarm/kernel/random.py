@@ -74,6 +74,33 @@ def uniforms(seed, particle, number):
     return Uniforms(_fraction(a, b), _fraction(c, d), _fraction(e, f), _fraction(g, h))
 
 
+class Seeding(Record):
+    """The seed of the random numbers of a run, and the number of its first particle.
+
+    Random numbers depend on these and on the impact. The number is 0 except in a shard, where particles are numbered as
+    in the whole run.
+    """
+
+    seed: Any = 0  # a signed integer of 64 bits, as kernels take it
+    first: Any = 0
+
+    def of_impact(self, i, number, laws):
+        """Return the random numbers of an impact of particle i with the `number` of impacts before it."""
+        return Stream(self.seed, self.first + i, number, 0, laws.across)
+
+    def unsigned(self) -> int:
+        """Return the seed as the user gave it."""
+        return int(self.seed) % 2**64
+
+
+UNSEEDED = Seeding()
+
+
+def seeding_of(seed: int, first: int = 0) -> Seeding:
+    """Return the `Seeding` with a seed of the user, from 0 to 2^64 - 1."""
+    return Seeding(seed - 2**64 if seed >= 2**63 else seed, first)
+
+
 class Stream(Record):
     """The random numbers of one event of a particle, from a seed, the particle, and the number of the event.
 

@@ -156,3 +156,15 @@ def column(rows: Array, row, i):
 def put(rows: Array, row, i, a):
     """Store a vector into three rows of a column."""
     rows[row, i], rows[row + 1, i], rows[row + 2, i] = a.x, a.y, a.z
+
+
+@inlined
+def vector_at(rows: Array, i, k):
+    """Return the vector in three columns of a row."""
+    return _new(Vec, (rows[i, k], rows[i, k + 1], rows[i, k + 2]))
+
+
+@inlined
+def set_vector(rows: Array, i, k, a):
+    """Store a vector into three columns of a row."""
+    rows[i, k], rows[i, k + 1], rows[i, k + 2] = a.x, a.y, a.z

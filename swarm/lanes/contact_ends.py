@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from ..contact.reflection import given, relative, rub, wall_velocity
-from ..contact.wall_impact import Arriving, RandomSource, book_energy, impact_on_wall
+from ..contact.wall_impact import Arriving, book_energy, impact_on_wall
 from ..kernel.arrays import index, scratch
 from ..kernel.gravity import potential
 from ..kernel.jit import outlined, select
@@ -177,7 +177,7 @@ def _send(method, walls, now, gravity, share, lanes, i, at):
     number = state.impacts[p] + np.int64(flier.hits) - 1
     for s in range(walls.length()):
         number -= np.int64(_lasts(state, s, p))
-    random = RandomSource(share.seed, share.first).of_impact(p, number, laws)
+    random = share.seeding.of_impact(p, number, laws)
     arriving = Arriving(r, before, square(before) + 2.0 * potential(gravity, r), mass)
     bounce = impact_on_wall(laws._replace(friction=None), now, gravity, wall, arriving, random)
     bounce = _rubbed(laws, wall, n, u, bounce, max(pressed + (bounce.impulse - 2.0 * c), 0.0))
@@ -194,7 +194,7 @@ def _send(method, walls, now, gravity, share, lanes, i, at):
     heat = book_energy(state, (row, p, p), mass, bounce)
     if share.counts is not None:
         share.counts.give(wall, heat, bounce.wait)
-    if state.absorbed is not None and bounce.wait > 0.0:
+    if state.absorbed_time is not None and bounce.wait > 0.0:
         _keep(method, walls, share, lanes, i, wall, bounce.wait)
     return bounce.impulse
 

@@ -9,7 +9,7 @@ from ..contact.absence import hit_wall, lets_through
 from ..contact.events import CAREFUL, EDGE, EVENT, FLYING, HELD
 from ..contact.hold import One, Two, drift
 from ..contact.reflection import given, wall_velocity
-from ..contact.wall_impact import Arriving, RandomSource, by_law
+from ..contact.wall_impact import Arriving, by_law
 from ..contact.wall_impact import book as book_impact
 from ..kernel.arrays import scratch
 from ..kernel.jit import long_kernel, outlined
@@ -115,7 +115,7 @@ def _send_off(method, walls, gravity, share, i):
     wall, r, v = contacts.met[i], column(state.position, 0, i), column(state.velocity, 0, i)
     remaining = contacts.remaining[i]
     now, mass = walls.at(remaining), state.mass[i]
-    random = RandomSource(share.seed, share.first).of_impact(i, state.impacts[i], laws)
+    random = share.seeding.of_impact(i, state.impacts[i], laws)
     # A particle that slides along another wall meets this one without end: restitution and edges are for slow impacts.
     slow = events.GRAZING * np.sqrt(max(speed2_scale(state, i), square(v)))
     happens, sent = by_law(laws, now, gravity, wall, Arriving(r, v, 2.0 * state.energy[i], mass, slow), random)
@@ -132,7 +132,7 @@ def _send_off(method, walls, gravity, share, i):
     put(state.velocity, 0, i, sent.v)
     struck = Struck(i, wall, share.moment - remaining, r, v, sent.v, sent.impulse * mass)
     share.watchers.hit(state.image, share.watchers.with_slip(laws, now, struck))
-    if state.absorbed is not None and not detain(share, i, wall, remaining, sent.wait):
+    if state.absorbed_time is not None and not detain(share, i, wall, remaining, sent.wait):
         end_frame(share, i)
         return True
     contacts.remaining[i] = remaining - sent.wait

@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from ..contact import crossing
 from ..contact.absence import closeness, hit_wall, lets_out, lets_through, open_wall_of, through
 from ..contact.energy import contact_energy
@@ -12,6 +10,7 @@ from ..kernel.arrays import index
 from ..kernel.jit import outlined, select
 from ..kernel.vector import norm, put
 from ..methods.contract import HARD, wall_of
+from ..state import absorb
 from ..surfaces.presence.openings import is_open
 from ..surfaces.presence.rooms import leads_on
 from .table import marked_lanes
@@ -30,18 +29,12 @@ def escape(share, p, wall, r, v, remaining):
     share.watchers.hit(share.state.image, Struck(p, wall, share.moment - remaining, r, v, v, 0.0))
 
 
-def absorb(share, p, wall, remaining):
-    """Book that a wall absorbs particle p when `remaining` is left of its frame; it keeps its place and velocity."""
-    absorbed = share.state.absorbed
-    absorbed.time[p], absorbed.wall[p] = share.moment - remaining, np.int32(wall)
-
-
 def detain(share, p, wall, remaining, wait):
     """Return whether particle p goes on in this frame after a wait at a wall, or book its absorption or later start."""
     if wait < remaining:
         return True
     if wait == math.inf:
-        absorb(share, p, wall, remaining)
+        absorb(share.state, p, wall, share.moment - remaining)
     else:
         share.state.starts[p] = share.moment - remaining + wait
     return False

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from ..contact.reflection import Bounce
-from ..contact.wall_impact import Arriving, RandomSource, book_energy, by_law
+from ..contact.wall_impact import Arriving, book_energy, by_law
 from ..kernel.arrays import index
 from ..kernel.jit import select
 from ..kernel.vector import put, square
@@ -54,7 +54,7 @@ def _compute(method, walls, gravity, share, lanes, picked, i):
     lane, sent, wall, laws = lanes.lane(i), Sending(lanes.rows, i), lanes.wall[i], method.laws
     here = method.walls_of(of_lane(walls, picked, i), lane.remaining)
     number = lanes.order[i] + np.int64(lane.hits)
-    random = RandomSource(share.seed, share.first).of_impact(lanes.particle[i], number, laws)
+    random = share.seeding.of_impact(lanes.particle[i], number, laws)
     happens, found = by_law(laws, here, gravity, wall, Arriving(lane.r, lane.v, lane.twice, sent.mass), random)
     # This ends the contact, unless a wall at 0 K holds the particle, or a user-defined law may.
     holds = not square(found.v) > 0.0
@@ -87,7 +87,7 @@ def _book(method, walls, share, lanes, i):
     for watch in share.watchers.of_impacts():
         watch.note(lanes, i, sent.impulse)
     lanes.wall[i] = sent.wall
-    if state.absorbed is not None and sent.wait > 0.0:
+    if state.absorbed_time is not None and sent.wait > 0.0:
         goes_on = detain(share, p, wall, lane.remaining, sent.wait)
         lane.remaining = lane.remaining - sent.wait if goes_on else 0.0
         lanes.wall[i] = lanes.wall[i] if goes_on else -1.0

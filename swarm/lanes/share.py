@@ -6,6 +6,7 @@ import numpy as np
 
 from ..kernel.arrays import next_of
 from ..kernel.jit import Array, select
+from ..kernel.random import Seeding
 from ..kernel.record import Record
 from .watching.watchers import Watchers
 
@@ -54,8 +55,7 @@ class Share(NamedTuple):
     draws: Draws
     halt: Array  # (1,) int64, passes after which to return
     span: float  # in the method's unit
-    seed: int  # of random numbers
-    first: int  # the number of particle 0 in the whole run, for its random numbers
+    seeding: Seeding
     moment: float  # the end of the frame [s]
     watchers: Watchers = Watchers()
 

@@ -15,6 +15,7 @@ from ..particles import Particles
 from ..scene import Scene
 from ..surfaces import required
 from ..surfaces.in_motion.moving import lacks_bend
+from ..surfaces.surface import named
 
 # Marks an argument that older files do not have: tables omit it at its default, so that these files stay the same.
 YOUNGER = {"younger": True}
@@ -120,7 +121,7 @@ def check_bends(scene: Scene) -> None:
     for i, surface in scene.pieces.owned():
         if lacks_bend(surface):
             raise SceneError(
-                f"surfaces[{i}] ({type(surface).__name__}) must give hessian_bounds() to move as {surface.motion} "
+                f"{named(i, surface)} must give hessian_bounds() to move as {surface.motion} "
                 "does: hits of such walls are found by safe steps; give it, or use a Translation alone"
             )
 

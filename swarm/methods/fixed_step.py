@@ -25,7 +25,7 @@ from ..particles import Particles
 from ..scene import Scene
 from ..surfaces.in_motion.drive import drive_of
 from ..surfaces.required import require
-from ..surfaces.surface import Surface
+from ..surfaces.surface import Surface, named
 from ..surfaces.time_of_impact import flights, safe
 from . import base, contract
 
@@ -224,7 +224,7 @@ def thinnest(scene: Scene, dt: float, balls: bool = False) -> tuple[float, int]:
 
 
 def _described(scene: Scene, i: int) -> str:
-    return f"surfaces[{i}] ({type(scene.surfaces[i]).__name__}), {2.0 * scene.surfaces[i].size():.3g} m thick"
+    return f"{named(i, scene.surfaces[i])}, {2.0 * scene.surfaces[i].size():.3g} m thick"
 
 
 def whole_steps(name: str, duration: float, dt: float) -> float:

@@ -14,7 +14,7 @@ from ..kernel import cache
 from ..kernel.arrays import index
 from ..kernel.grid import layer_of, number_of, wrapped
 from ..kernel.jit import Array, kernel, outlined, select
-from ..kernel.vector import Vec, column, put
+from ..kernel.vector import column, put, vector_at
 from ..state import Floats
 
 # Up to this number of places are tested in plain Python, before a compiler would be done.
@@ -97,7 +97,7 @@ def _met(cells, r, radius, stops):
     count, deepest, most = 0, -1, 0.0
     for k in range(cells.begin.size):
         level = index(k)
-        shape = Vec(cells.shape[level, 0], cells.shape[level, 1], cells.shape[level, 2])
+        shape = vector_at(cells.shape, level, 0)
         (x, x_end), (y, y_end), (z, z_end) = (_around(cells, level, axis, one) for axis, one in enumerate(r))
         for i in range(x, x_end):
             for j in range(y, y_end):
@@ -126,7 +126,7 @@ def _enter(cells, i, r):
     """Enter ball i at r."""
     level = index(cells.level[i])
     x, y, z = _layer(cells, level, 0, r.x), _layer(cells, level, 1, r.y), _layer(cells, level, 2, r.z)
-    shape = Vec(cells.shape[level, 0], cells.shape[level, 1], cells.shape[level, 2])
+    shape = vector_at(cells.shape, level, 0)
     cell = index(number_of(shape, x, y, z + cells.begin[level]))
     put(cells.position, 0, i, r)
     cells.others[i] = cells.first[cell]

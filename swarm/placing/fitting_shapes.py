@@ -5,7 +5,7 @@ import math
 from ..errors import SceneError
 from ..scene import Scene
 from ..state import Floats
-from ..surfaces.surface import Surface, shown
+from ..surfaces.surface import Surface, named, shown
 
 
 def _nearest_lid(scene: Scene, surface: Surface) -> float:
@@ -31,7 +31,7 @@ def require_shapes(scene: Scene, radius: Floats) -> None:
         lid = _nearest_lid(scene, surface)
         if lid < radius[largest]:
             raise SceneError(
-                f"surfaces[{i}] ({type(surface).__name__}) must be as far from the plane as the largest radius, "
+                f"{named(i, surface)} must be as far from the plane as the largest radius, "
                 f"{radius[largest]:g} m of particle {largest}, at its walls parallel to the plane, got {lid:g} m; make "
                 f"it endless, or longer along {scene.plane}"
             )
@@ -40,7 +40,7 @@ def require_shapes(scene: Scene, radius: Floats) -> None:
             sure = "" if where is None else f" that is certain, that at {shown(where)},"
             raise SceneError(
                 f"radius must be below {surface.largest_ball():.6g} m, the smallest radius of curvature{sure} of "
-                f"surfaces[{i}] ({type(surface).__name__}), so that no ball touches it at several points at once, got "
+                f"{named(i, surface)}, so that no ball touches it at several points at once, got "
                 f"{radius[largest]:g} m of particle {largest}; use smaller balls, or a rounder surface{_surer(surface)}"
             )
 

@@ -16,6 +16,7 @@ from ..ball_numbers import BallNumbers
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
 from ..errors import RunError
+from ..kernel.random import Seeding
 from ..lanes.watching.watchers import Watchers
 from ..methods.base import Method
 from ..observables import CHUNK
@@ -24,7 +25,7 @@ from . import failures
 from .feeding import Feed
 from .impacts import ThreadLog
 from .observed import Observed, balance, gone_of, poses_of, with_walls
-from .starting_state import Seeding
+from .preflight.counting import Counting
 from .tally import Watched
 from .tiers import Tier
 from .watch import Watch
@@ -66,6 +67,8 @@ class BaseRun:
     _law: Any = None
     # The walls as observed.
     _walls: Any
+    # The counters, and their arrays.
+    _counting: Counting
     # The observables of balls; None for points.
     _ball_numbers: BallNumbers | None = None
     # The births of balls during the run, or None.
@@ -378,14 +381,18 @@ class BaseRun:
         """Return the number of particles of a kernel between two looks at the halt."""
         return _AT_ONCE_PLAIN if self._tier.is_plain else _AT_ONCE
 
-    def _watchers(self, counters: Any) -> Watchers:
-        """Return the log, the tally and the counters of the calling thread."""
-        log = None if self._impacts is None else self._impacts.example
-        return Watchers(log, None if self._tally is None else self._tally.counts(), counters)
+    def _watchers(self, page: ThreadLog | None = None) -> Watchers:
+        """Return the watchers of the calling thread, with the log that it fills; without one for the types alone."""
+        counts = None if self._tally is None else self._tally.counts()
+        return Watchers(self._log_of(page), counts, self._counting.counters)
 
-    def _open_page(self, end: float) -> ThreadLog | None:
-        """Return the log of the calling thread, for the frame that ends at a time [s]; None in a run without a log."""
-        return None if self._impacts is None else ThreadLog(self._impacts, end)
+    def _log_of(self, page: ThreadLog | None) -> Any:
+        """Return the log that a thread fills, without one a log of the same type; None in a run without a log."""
+        return page.log if page is not None else None if self._impacts is None else self._impacts.example
+
+    def _open_page(self, end: float) -> ThreadLog:
+        """Return the log of the calling thread, for the frame that ends at a time [s]."""
+        return ThreadLog(self._impacts, end)
 
     def is_plain(self) -> bool:
         """Whether the kernels run in plain Python."""
@@ -405,10 +412,10 @@ class BaseRun:
 def arrays_of(found: Mapping[str, Any]) -> Arrays:
     """Return the arrays of a checkpoint, without None; arrays of a named tuple have its name first.
 
-    >>> from swarm.state import Absorbed
-    >>> absorbed = Absorbed(np.zeros(1), np.zeros(1, np.int32))
-    >>> list(arrays_of({"impacts": np.zeros(1), "heat": None, "absorbed": absorbed}))
-    ['impacts', 'absorbed.time', 'absorbed.wall']
+    >>> from swarm.state import Crossed
+    >>> crossed = Crossed(*np.zeros((3, 1)))
+    >>> list(arrays_of({"impacts": np.zeros(1), "heat": None, "crossed": crossed}))
+    ['impacts', 'crossed.side', 'crossed.number', 'crossed.sums']
     """
     arrays: Arrays = {}
     for name, value in found.items():

@@ -73,13 +73,12 @@ class DoorRun(Run):
             return
         page, walls = self._open_page(self._moment), self._walls_before.at(0.0)
         cut = self._left[:, None] & loses & (pressed + rubbed > 0.0)
-        if page is not None:
-            for row, i in np.argwhere(cut):
-                if page.log.filled[0] == page.log.time.size:
-                    page.turn()
-                at = i, column(state.position, 0, i), column(state.velocity, 0, i), page.log.begin
-                log_cut_contact(page.log, self._numbers.laws_at_ends, walls, state, row, at)
-            page.close()
+        for row, i in np.argwhere(cut) if page.log is not None else ():
+            if page.log.filled[0] == page.log.time.size:
+                page.turn()
+            at = i, column(state.position, 0, i), column(state.velocity, 0, i), page.log.begin
+            log_cut_contact(page.log, self._numbers.laws_at_ends, walls, state, row, at)
+        page.close()
         pressed[cut] = rubbed[cut] = 0.0
 
     # --- At an instant -----------------------------------------------------------------------------------

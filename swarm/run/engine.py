@@ -15,6 +15,7 @@ from ..compiled_scene import CompiledScene
 from ..contact.events import ARRIVED, CAREFUL, EDGE, EVENT, HELD, PHASES
 from ..contact.hold import One, Two
 from ..contact.laws import NONE
+from ..kernel.random import UNSEEDED, Seeding
 from ..lanes import block as blocks
 from ..lanes import careful, contact_events, slide, sliding, table
 from ..lanes import lane_arrays as lanes
@@ -27,9 +28,9 @@ from ..state import State
 from . import failures
 from .base import Arrays, BaseRun, result_of
 from .impacts import ThreadLog
-from .preflight.counting import counters_of, with_counters
+from .preflight.counting import Counting
 from .present import Presence
-from .starting_state import UNSEEDED, Seeding, begin, have_lasted, holders_of_resting, state_of
+from .starting_state import begin, have_lasted, holders_of_resting, state_of
 from .tally import UNWATCHED, Watched
 from .tiers import Tier
 from .turns import End, Turns, left_behind
@@ -65,13 +66,13 @@ class Run(BaseRun):
             # Impacts are logged at the ends of contacts, also without laws.
             self._numbers = self._numbers._replace(ends=NONE)
         self._walls = compiled.walls()
-        takes_time = self._numbers.contacts_take_time
-        tier, counters = Tier(compile, (self._numbers, self._law, self._walls), n), watched.counters
+        logs = watched.log is not None or self._numbers.contacts_take_time
+        self._counting = Counting(scene, watched.counters, logs)
+        tier = Tier(compile, (self._numbers, self._law, self._walls), n)
         super().__init__(compiled, method, n, threads, tier, seeding, watched)
-        self._counters = counters_of(scene, counters, self._impacts is not None or takes_time)
         self._booked = lanes.booked(self._walls)
         self.state = state_of(compiled, particles, method, self._booked, self._numbers.laws_at_ends is not None)
-        self.state = with_counters(self.state, self._counters, counters, scene)
+        self.state = self.state._replace(crossed=self._counting.crossed(particles.position))
         observables.start_energies(compiled, self._law, self.state)
         self._faces = scene.open_faces()
         # A block consists of whole chunks, so that each thread observes the particles that it has advanced.
@@ -79,7 +80,7 @@ class Run(BaseRun):
         self._present = Presence(particles.births, self.state, self._size)
         self._ticket = np.zeros(1, np.int64)
         self._phase = np.zeros(n, np.int8)
-        self._seed = seeding.signed()
+        self._seeding = seeding
         self._kinds: set[int] = set()  # the phases other than flight that particles have been in
         self._halted = lanes.none_halted(self._booked)
         self._lanes: list[lanes.Lanes] = []  # the lanes that no thread uses now
@@ -127,8 +128,7 @@ class Run(BaseRun):
         return freed
 
     def _failure(self, status: Status, item: int, span: float, moment: float) -> str:
-        seeding = Seeding(self._seed, self._first)
-        return failures.of_frame(self._compiled, self._method, self.state, (status, item), moment, seeding)
+        return failures.of_frame(self._compiled, self._method, self.state, (status, item), moment, self._seeding)
 
     def _share(self, span: float) -> End:
         """Advance and observe the particles that one thread draws; return the end of this."""
@@ -146,12 +146,11 @@ class Run(BaseRun):
             some, end = max(1, len(self._present.order) // (_PARTS * self._threads)), _DONE
             while end[0] == Status.DONE and (order := take(draws, some)).size:
                 end = self._part(span, draws.again(order), mine, page)
-        if page is not None:
-            page.close()
+        page.close()
         self._lanes.append(mine)
         return end
 
-    def _part(self, span: float, draws: Draws, mine: lanes.Lanes, page: ThreadLog | None) -> End:
+    def _part(self, span: float, draws: Draws, mine: lanes.Lanes, page: ThreadLog) -> End:
         """Advance and observe a part of the particles: in flight, then at walls and along them, in turns."""
         share = self._shared(span, draws)
         status, particle, drawn = self._kernel(blocks.advance_block, page)(*self._flying(share, mine))
@@ -180,10 +179,9 @@ class Run(BaseRun):
         live = particle
         return status, 0, lanes.Halted(mine.particle[:live].copy(), mine.left_behind[:, :live].copy())
 
-    def _kernel(self, kernel: Any, page: ThreadLog | None) -> Any:
-        """Return a kernel of this tier that advances particles, and writes their impacts to a page of the log."""
-        chosen = self._tier.kernel(kernel)
-        return chosen if page is None else functools.partial(page.call, chosen)
+    def _kernel(self, kernel: Any, page: ThreadLog) -> Any:
+        """Return a kernel of this tier that advances particles, and writes their impacts to the log of this thread."""
+        return functools.partial(page.call, self._tier.kernel(kernel))
 
     def observe(self) -> None:
         # No particle is advanced.
@@ -239,7 +237,7 @@ class Run(BaseRun):
             made = made._replace(stand=table.table(self._walls.length()))
         watched = self._impacts is not None or self._tally is not None
         made = made._replace(before=table.table(impact_log.ROWS)) if watched else made
-        counters = self._counters
+        counters = self._counting.counters
         return made if counters is None else made._replace(began=table.table(counters.rows()))
 
     def _shared(self, span: float, draws: Draws) -> Share:
@@ -247,7 +245,7 @@ class Run(BaseRun):
         return Share(
             self._present.flying(self.state), self._present.of(self._phase), np.zeros(PHASES, np.int64), self._halted,
             draws, self._watch.passes, span,
-            self._seed, self._first, self._moment, self._watchers(self._counters),
+            self._seeding, self._moment, self._watchers(),
         )  # fmt: skip
 
     def _flying(self, share: Share, mine: lanes.Lanes) -> tuple[Any, ...]:

@@ -8,11 +8,11 @@ import importlib
 from types import ModuleType
 from typing import Any
 
+from ..kernel.random import seeding_of
 from .base import BaseRun
 from .doors import DoorRun
 from .engine import Run
 from .options import Task
-from .starting_state import Seeding
 from .tally import UNWATCHED, Watched
 
 
@@ -38,6 +38,6 @@ def run_of(task: Task, watched: Watched = UNWATCHED) -> BaseRun:
         kind = wing("grains.grains_run").GrainsRun
     elif particles.radius is not None:
         kind = wing("events.heavy_run").HeavyRun if scene.reacts() else wing("events.balls_run").CollidingRun
-    how = options.thread_count(), options.block_size, options.compile, Seeding(options.seed, task.first), watched
+    how = options.thread_count(), options.block_size, options.compile, seeding_of(options.seed, task.first), watched
     run: BaseRun = kind(task.compiled, what, method, *how)
     return run

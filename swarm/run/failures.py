@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 from ..common.status import Status
 from ..compiled_scene import CompiledScene
 from ..errors import RunError, SceneError
-from ..kernel.random import Stream
+from ..kernel.random import Seeding
 from ..kernel.vector import ZERO, column
 from ..methods.base import Method
 from ..scene import Scene
 from ..state import State
-from ..surfaces.surface import shown
+from ..surfaces.surface import named, shown
 from ..surfaces.wall_law import leave_of, mirrored, sentence_of, why_wrong
 from .options import Task
 from .preflight import softness
-from .starting_state import Seeding
 
 # The end of a sentence on a particle that does not go on, if no user-defined function may be the cause.
 _REPORT = "; if nothing is special about the place, it is an error of swarm: please report it with the scene"
@@ -86,7 +85,7 @@ def _in_gap(scene: Scene, place: Any, moment: float, radius: float) -> str:
     touched = np.flatnonzero(outside >= -_TOUCHES * scene.finite_size()).tolist()
     if len(touched) < 2:
         return ""
-    names = " and ".join(_named(scene, wall) for wall in touched)
+    names = " and ".join(named(wall, scene.surfaces[wall]) for wall in touched)
     return (
         f", where it touches {names} at once: a gap as wide as the ball, {2.0 * radius:g} m, leaves it no way between "
         "two impacts; make the gap wider than that or the ball smaller, or let it not come there"
@@ -134,7 +133,7 @@ def require_admissible(
     outside &= ~state.gone()
     if outside.any():
         wall, particle = np.unravel_index(int(np.argmax(distances * outside)), distances.shape)
-        depth = f"{distances[wall, particle]:.3g} m outside {_named(scene, int(wall))}"
+        depth = f"{distances[wall, particle]:.3g} m outside {named(int(wall), scene.surfaces[wall])}"
         phi = "; ".join(filter(None, (depth, _unproved(scene, int(wall)))))
         raise RunError(f"{_failed(moment)} {first + particle}: it is {phi}")
 
@@ -146,8 +145,9 @@ def sentence_of_coming(
     wall, particle = found
     place = shown(state.position[:, particle], 6)
     return (
-        f"{_named(scene, wall)} must come where no particle is: at {instant:g} s particle {first + particle} is "
-        f"{depth:.3g} m inside, at {place} m; let it come later or elsewhere, or start that particle elsewhere"
+        f"{named(wall, scene.surfaces[wall])} must come where no particle is: at {instant:g} s particle "
+        f"{first + particle} is {depth:.3g} m inside, at {place} m; let it come later or elsewhere, or start that "
+        "particle elsewhere"
     )
 
 
@@ -156,7 +156,7 @@ def _place(scene: Scene, state: State, particle: int, moment: float) -> str:
     remaining = 0.0 if state.contacts is None else state.contacts.remaining[particle]
     place, found = state.position[:, particle], moment - remaining
     wall = int(np.argmax(scene.distances_outside(place[:, None], found)[:, 0]))
-    where = f"{shown(place, 6)} m, at {_named(scene, wall)}"
+    where = f"{shown(place, 6)} m, at {named(wall, scene.surfaces[wall])}"
     return f"; it is at {where}" + (f" at {found:.9g} s" if remaining > 0.0 else "")
 
 
@@ -169,7 +169,7 @@ def _of_law(compiled: CompiledScene, state: State, particle: int, moment: float,
     r, v = column(state.position, 0, particle), column(state.velocity, 0, particle)
     n = -1.0 * walls.unit_normal(wall, r)
     u = walls.velocity(wall, r) if scene.moves() else ZERO
-    random = Stream(seeding.seed, seeding.first + particle, state.impacts[particle], 0, laws.across)
+    random = seeding.of_impact(particle, state.impacts[particle], laws)
     with np.errstate(all="ignore"):
         for one in (one for one in laws.own or () if one.has(wall)):
             for k, law in enumerate(one.laws_of(wall)):
@@ -183,10 +183,6 @@ def _of_law(compiled: CompiledScene, state: State, particle: int, moment: float,
 
 def _failed(moment: float) -> str:
     return f"the frame at {moment:g} s failed at particle"
-
-
-def _named(scene: Scene, wall: int) -> str:
-    return f"surfaces[{wall}] ({type(scene.surfaces[wall]).__name__})"
 
 
 @contextlib.contextmanager

@@ -14,7 +14,6 @@ from ..errors import RunError, SceneError
 from ..lanes.share import Share
 from ..lanes.table import LANES, STRIDE
 from ..lanes.watching.log import GOING, Log
-from ..lanes.watching.watchers import Watchers
 from .options import RunOptions, Task
 
 # The rows of a log, and the number of logs besides two for each thread, as some are written while others are filled. A
@@ -140,15 +139,20 @@ def log_of(task: Task) -> Impacts | None:
 
 
 class ThreadLog:
-    """The log that one thread fills.
+    """The log that one thread fills, in the frame that ends at a time [s].
 
     Attributes:
-        log: the log that is being filled.
+        log: the log that is being filled; None in a run without a log, in which `turn` and `close` do nothing.
     """
 
-    def __init__(self, impacts: Impacts, end: float) -> None:
+    def __init__(self, impacts: Impacts | None, end: float) -> None:
         self._impacts, self._end = impacts, end
-        self.log = impacts.empty(end)
+        self.log: Any = None
+        self._begin()
+
+    def _begin(self) -> None:
+        if self._impacts is not None:
+            self.log = self._impacts.empty(self._end)
 
     def call(self, kernel: Any, *arguments: Any) -> tuple[int, int, int]:
         """Call a kernel, again with an empty log each time the log is full; return its result."""
@@ -161,19 +165,17 @@ class ThreadLog:
             self.log.going[:] = going
 
     def _with_log(self, one: Any) -> Any:
-        return one._replace(watchers=self.watched_by(one.watchers)) if isinstance(one, Share) else one
-
-    def watched_by(self, watchers: Watchers) -> Watchers:
-        """Return these watchers with the log to be filled."""
-        return watchers._replace(log=self.log)
+        return one._replace(watchers=one.watchers._replace(log=self.log)) if isinstance(one, Share) else one
 
     def turn(self) -> None:
         """Hand over the rows so far, and begin an empty log."""
         self.close()
-        self.log = self._impacts.empty(self._end)
+        self._begin()
 
     def close(self) -> None:
         """Hand over the rows so far."""
+        if self._impacts is None:
+            return
         if self.log.filled[1]:
             raise RunError(
                 f"the frame at {self._end:g} s has flights that cross counters more often, or steps in which more "

@@ -89,7 +89,7 @@ def carry_out_task(task: Task, session: Session) -> Result:
                         show.within(before + share * (moment - before), until)
                         session.look(run, writer, number - 1, before, moment)
                 seen = {"time": moment, **run.seen()}
-                seen |= tally.seen(run.state.absorbed, task.is_shard) if tally else {}
+                seen |= tally.seen(run.state.absorbed_wall, task.is_shard) if tally else {}
                 run.require_admissible(seen, moment)
                 read = functools.partial(getattr, run.state)
                 seen |= measures.of(number, moment, _snapshot_of(task, read, moment)) if measures else {}

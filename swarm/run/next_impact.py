@@ -8,9 +8,10 @@ from numpy.typing import ArrayLike
 
 from ..common import checks
 from ..contact.laws import NONE
-from ..contact.wall_impact import Arriving, RandomSource, impact_on_wall
+from ..contact.wall_impact import Arriving, impact_on_wall
 from ..errors import RunError, SceneError
 from ..kernel.gravity import accelerated, displacement, potential
+from ..kernel.random import seeding_of
 from ..kernel.vector import square, vec
 from ..methods import Impact
 from ..particles import Particles
@@ -21,7 +22,6 @@ from ..surfaces.time_of_impact import flights
 from .options import RunOptions
 from .preflight.knows import Asked, require_supported
 from .preflight.starts import require_inside
-from .starting_state import Seeding
 
 # The most parts of a flight, each of which surely meets no wall, in the search for a hit.
 _PARTS = 1000
@@ -83,7 +83,7 @@ def bounce(scene: Scene, position: ArrayLike, velocity: ArrayLike, mass: float =
     compiled = scene.compiled()
     walls, pull = compiled.walls(), scene.pull()
     laws = compiled.laws or NONE
-    random = RandomSource(Seeding(checks.seed("seed", seed)).signed(), 0).of_impact(0, 0, laws)
+    random = seeding_of(checks.seed("seed", seed)).of_impact(0, 0, laws)
     r, v, flown = vec(particle.position[:, 0]), vec(particle.velocity[:, 0]), 0.0
     # The functions of kernels run in plain Python; with numbers of NumPy, 1/0 is infinite as in compiled kernels.
     with np.errstate(all="ignore"):

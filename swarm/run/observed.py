@@ -64,8 +64,7 @@ def gone_of(state: State, far: int, owners: NDArray[np.int64], surfaces: int) ->
     gone: dict[str, Any] = {"escaped": far}
     if state.escape_time is not None:
         gone["escaped"] += int(np.count_nonzero(~np.isnan(state.escape_time)))
-    if state.absorbed is not None:
-        walls = state.absorbed.wall
+    if (walls := state.absorbed_wall) is not None:
         gone["absorbed"] = np.bincount(owners[walls[walls >= 0]], minlength=surfaces).astype(np.int64)
     return gone
 

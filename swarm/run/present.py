@@ -66,7 +66,7 @@ class Presence:
 
     def flying(self, state: State) -> State:
         """Return the state that kernels take, with the times of starts only if a law may let particles wait."""
-        return state if state.starts is None or state.absorbed is not None else state._replace(starts=None)
+        return state if state.starts is None or state.absorbed_time is not None else state._replace(starts=None)
 
 
 def total_of(sums: Floats) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """The state of particles that are independent of one another, at the start of a run and of a frame."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,24 +10,6 @@ from ..contact.events import ARRIVED, FLYING
 from ..methods.base import Method
 from ..particles import Particles
 from ..state import Contacts, Floats, Multipliers, State, none_left
-
-
-class Seeding(NamedTuple):
-    """The seed of random numbers, and the number of the first particle of this run.
-
-    Random numbers depend on these and on the impact. The number is 0 except in a shard, where particles are numbered as
-    in the whole run.
-    """
-
-    seed: int = 0
-    first: int = 0
-
-    def signed(self) -> int:
-        """Return the seed for kernels: the signed integer with the same 64 bits."""
-        return self.seed - 2**64 if self.seed >= 2**63 else self.seed
-
-
-UNSEEDED = Seeding()
 
 
 def state_of(
@@ -87,7 +68,7 @@ def begin(state: State, phase: NDArray[np.int8], frame: tuple[float, float], las
             # Particles at rest need no kernel.
             state.impulse[: len(contacts.load)] += contacts.load * (span * state.mass)
             contacts.sliding[:] += span * rests
-    if state.escape_time is not None or state.absorbed is not None:
+    if state.escape_time is not None or state.absorbed_time is not None:
         phase[state.gone()[: len(phase)]] = ARRIVED
     if state.starts is not None:
         left = method.parts(end - state.starts[: len(phase)])

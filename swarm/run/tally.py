@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..lanes.watching.counts import PARTS, Counts, Sums
-from ..state import Absorbed
 from ..surfaces.counter import Counter
 from .impacts import Impacts
 from .options import Task
@@ -96,15 +95,18 @@ class Tally:
             sums.whole[:], sums.rest[:] = arrays[f"member_{name}"]
             _carry(sums.whole, sums.rest)
 
-    def seen(self, absorbed: Absorbed | None = None, is_shard: bool = False) -> dict[str, NDArray[Any]]:
-        """Return the observables of all members, surface by surface; in a shard sums are pairs of whole numbers."""
+    def seen(self, absorbed: NDArray[np.int32] | None = None, is_shard: bool = False) -> dict[str, NDArray[Any]]:
+        """Return the observables of all members, surface by surface; in a shard sums are pairs of whole numbers.
+
+        `absorbed` has the wall that has absorbed each particle, or -1.
+        """
         arrays = self.arrays()
         found: dict[str, NDArray[Any]] = {"member_impacts": self._of_members(arrays["member_impacts"])}
         for name, unit in self._summed().items():
             parts = np.array([self._of_members(row) for row in arrays[f"member_{name}"]])
             found[OBSERVED[name]] = parts if is_shard else value_of(parts, unit)
         if absorbed is not None:
-            on = absorbed.wall[absorbed.wall >= 0]
+            on = absorbed[absorbed >= 0]
             found["member_absorbed"] = np.bincount(self._places[on], minlength=self._members)
         return found
 

@@ -17,6 +17,7 @@ from ..state import Floats
 from ..surfaces.area_samples import Random
 from ..surfaces.instant import distances, side_of
 from ..surfaces.plane import along
+from ..surfaces.surface import named
 from .places import PointBatches, SourcePlace, changes, place_of
 from .source import Source
 
@@ -265,7 +266,7 @@ def _require_free(scene: Scene, name: str, times: Floats, position: Floats) -> N
             k = int(np.argmax(np.where(np.isnan(depths), np.inf, depths)))
             raise SceneError(
                 f"{name} must be free when particles come, got a birth at {times[k]:g} s at "
-                f"{tuple(position[:, k].tolist())}, {depths[k]:.3g} m inside surfaces[{i}] ({type(surface).__name__}) "
+                f"{tuple(position[:, k].tolist())}, {depths[k]:.3g} m inside {named(i, surface)} "
                 "at this time; move the source, or give a start and a stop between which it is free"
             )
 

@@ -13,7 +13,7 @@ from .fields.members import Members
 from .instant import box_of
 from .rotation import Rotated
 from .shapes.solid import SolidNumbers
-from .surface import Surface, shown
+from .surface import Surface, named, shown
 
 # The methods that the definitions of contract.py call. Methods without a definition, such as `hessian`, must be given.
 _MADE_OF = {
@@ -145,7 +145,7 @@ def apart_of(surfaces: Sequence[Surface]) -> str | None:
     for (i, one, box), (j, other, its) in itertools.combinations(boxes, 2):
         if (np.maximum(box[0], its[0]) > np.minimum(box[1], its[1])).any():
             return (
-                f"surfaces[{i}] ({type(one).__name__}) and surfaces[{j}] ({type(other).__name__}) are apart: particles "
+                f"{named(i, one)} and {named(j, other)} are apart: particles "
                 "live in what all surfaces have in common; a vessel of several rooms is one surface, "
                 'swarm.Union([...]), in a scene file kind = "union"'
             )

@@ -582,6 +582,11 @@ def shown(point: Any, digits: int = 4) -> str:
     return f"({', '.join(f'{part:.{digits}g}' for part in point)})"
 
 
+def named(i: int, surface: Surface) -> str:
+    """The surface with a number in a scene, as errors name it: surfaces[2] (Sphere)."""
+    return f"surfaces[{i}] ({type(surface).__name__})"
+
+
 def farthest(point: Vector) -> float:
     """Return the largest magnitude of a coordinate of a point."""
     return max(map(abs, point))

@@ -6,7 +6,7 @@ import numpy as np
 
 import swarm
 from swarm.events.balls_run import CollidingRun
-from swarm.run.starting_state import Seeding
+from swarm.kernel.random import Seeding
 from swarm.run.tally import Watched
 
 BOX = swarm.Box((1.0, 1.0, 1.0))

@@ -11,7 +11,7 @@ from colliding.gases import depth, frames, gas
 import swarm
 from swarm.events.colliding.heavy import STRIKES, Heavy
 from swarm.events.heavy_run import HeavyRun
-from swarm.run.starting_state import Seeding
+from swarm.kernel.random import Seeding
 from swarm.run.tally import Watched
 
 ACROSS = (1.0, 0.0, 0.0)

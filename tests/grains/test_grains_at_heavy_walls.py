@@ -12,7 +12,7 @@ import swarm
 from swarm.errors import SceneError
 from swarm.files import checkpoint
 from swarm.grains.grains_run import GrainsRun
-from swarm.run.starting_state import Seeding
+from swarm.kernel.random import Seeding
 from swarm.run.tally import Watched
 
 UP = swarm.Guide((0.0, 0.0, 1.0))

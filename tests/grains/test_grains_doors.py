@@ -11,7 +11,7 @@ import swarm
 from swarm.errors import RunError
 from swarm.files import checkpoint
 from swarm.grains.grains_run import GrainsRun
-from swarm.run.starting_state import Seeding
+from swarm.kernel.random import Seeding
 from swarm.run.tally import Watched
 
 RADIUS, ALPHA, SPEED = 0.1, 400.0, 1.0

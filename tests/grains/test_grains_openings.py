@@ -12,8 +12,8 @@ import swarm
 from swarm.files import checkpoint
 from swarm.grains import exits, grain_arrays
 from swarm.grains.grains_run import GrainsRun
+from swarm.kernel.random import Seeding
 from swarm.kernel.vector import Vec
-from swarm.run.starting_state import Seeding
 from swarm.run.tally import Watched
 
 RADIUS, ALPHA, DOWN = 0.1, 4e4, (0.0, 0.0, -9.81)

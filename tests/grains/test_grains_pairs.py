@@ -12,8 +12,8 @@ from swarm.grains import grain_arrays as arrays
 from swarm.grains.cell import Lengths, nearest
 from swarm.grains.grain_arrays import ENDS
 from swarm.grains.grains_run import GrainsRun
+from swarm.kernel.random import Seeding
 from swarm.kernel.vector import Vec
-from swarm.run.starting_state import Seeding
 from swarm.run.tally import Watched
 
 RADIUS, MASS, ALPHA, SPEED = 0.01, 0.002, 1e5, 1.0

@@ -11,7 +11,7 @@ from swarm.grains.drags import carry, kept_drags, room_for
 from swarm.grains.grain_arrays import FACE, near_of
 from swarm.grains.grains_run import GrainsRun
 from swarm.kernel.cache import in_python
-from swarm.run.starting_state import Seeding
+from swarm.kernel.random import Seeding
 from swarm.run.tally import Watched
 
 METHOD = swarm.Penalty(0.002, 400.0, 1.5)

@@ -12,9 +12,9 @@ from swarm import RunError, SceneError
 from swarm.commands.summary import numbers, of_file
 from swarm.grains import contacts, step
 from swarm.grains.grains_run import GrainsRun
+from swarm.kernel.random import Seeding
 from swarm.pictures.series import lines_of
 from swarm.run.preflight import softness
-from swarm.run.starting_state import Seeding
 from swarm.run.tally import Watched
 from swarm.words.content import Content
 from swarm.words.verdicts import judged

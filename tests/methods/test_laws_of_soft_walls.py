@@ -13,7 +13,7 @@ from swarm.contact import corner
 from swarm.contact.discrete_gradient import Composite
 from swarm.contact.impulse import Step
 from swarm.contact.regularisation import Linear
-from swarm.contact.wall_impact import RandomSource
+from swarm.kernel.random import Seeding
 from swarm.kernel.vector import Vec
 from swarm.run.base import BaseRun
 from swarm.run.doors import DoorRun
@@ -233,11 +233,11 @@ def test_each_contact_is_an_impact_and_has_a_row_in_the_end(tmp_path, monkeypatc
 
 def test_no_two_contacts_in_an_edge_have_one_draw(monkeypatch):
     """One begins while the other lasts: both have ended after it, and each has a random number of its own."""
-    scene, drawn, of_impact = edge(90.0, laws=[swarm.Lambert(0.7)])[0], [], RandomSource.of_impact
+    scene, drawn, of_impact = edge(90.0, laws=[swarm.Lambert(0.7)])[0], [], Seeding.of_impact
     monkeypatch.setattr(
-        RandomSource,
+        Seeding,
         "of_impact",
-        lambda source, p, k, laws: (drawn.append((p, int(k))), of_impact(source, p, k, laws))[1],
+        lambda seeding, p, k, laws: (drawn.append((p, int(k))), of_impact(seeding, p, k, laws))[1],
     )
     result = ran(scene, into_edge(90.0, np.linspace(-0.8, 0.8, 9)), PENALTY, 1.5)
     assert result.observables["contact_energy"][-1] == 0.0

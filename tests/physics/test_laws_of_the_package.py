@@ -275,9 +275,9 @@ def test_of_a_field_each_member_is_known():
     with run:
         run.observe()
         run.advance(5.0, 5.0)
-        absorbed = run.state.absorbed
-        gone = absorbed.wall >= 0
-        surface, member = scene.compiled().numbering.members[:, absorbed.wall[gone]]
+        wall = run.state.absorbed_wall
+        gone = wall >= 0
+        surface, member = scene.compiled().numbering.members[:, wall[gone]]
         assert gone.sum() == run.seen()["absorbed"][1] > 30
         assert (surface == 1).all()
         away = run.state.position[:, gone] - np.array(centers)[member].T

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import swarm
-from swarm.contact.wall_impact import RandomSource
 from swarm.events.reacting.described import freedoms_of, scenery_of
 from swarm.events.reacting.freedoms import Freedoms, ParticleFlight
 from swarm.kernel.jit import select
+from swarm.kernel.random import Seeding
 from swarm.kernel.vector import ZERO, Vec, dot
 
 UP = (0.0, 0.0, 1.0)
@@ -179,7 +179,7 @@ def test_a_gas_in_equilibrium_with_its_wall_stays_so(laws, guided):
     compiled, rng = scene.compiled(), np.random.default_rng(5)
     first = freedoms_of(compiled, np.ones((3, 1)))
     (wall,) = scenery_of(compiled, 0.0).reacting
-    source, changes = RandomSource(np.int64(7), 0), []
+    source, changes = Seeding(np.int64(7), 0), []
     while len(changes) < count:
         u = rng.normal(size=3) * math.sqrt(energy / wall_mass)
         if guided:

@@ -53,7 +53,7 @@ class Touching(NamedTuple):
     friction: Any  # (walls + G + C,)
     is_dissipative: bool  # whether any wall takes energy
     laws: Any = None  # the `Laws` of the walls of the scene if one sends bodies off
-    random: Any = None  # the `RandomSource` of these laws
+    seeding: Any = None  # the `Seeding` of these laws
 
     def place(self, r, k, i):
         """The place of contact point k of a lane, or its velocity if r has velocities."""

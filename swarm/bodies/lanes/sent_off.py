@@ -19,6 +19,7 @@ from ...kernel.jit import outlined
 from ...kernel.limits import EPSILON
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, column, dot, square
+from ...state import absorb
 from .contacts import MOST_CONTACTS, direction, put_direction
 from .impact import body_impact, chatters
 
@@ -101,7 +102,7 @@ def _by_law(bodies, state, name, frame, contact, i):
     mass = 1.0 / blow.schur[0, 0]
     # Every event has another number, as the body has a blow, or makes a step, between two events.
     event = MOST_CONTACTS * (state.impacts[number] + state.steps[number]) + a
-    random = touching.random.of_impact(number, event, touching.laws)
+    random = touching.seeding.of_impact(number, event, touching.laws)
     happens, sent = _sent(blow, state, rate, p, (mass, rests), random, i)
     if not happens:
         return False
@@ -110,7 +111,7 @@ def _by_law(bodies, state, name, frame, contact, i):
     if state.absorbed_time is not None and sent.wait == math.inf:
         blow.tell(state, 0, arrives, mass * rate[0], i)
         state.impulse[row, number] += mass * rate[0]
-        state.absorbed_time[number], state.absorbed_wall[number] = bodies.rule.end - bodies.pace.remaining[i], w
+        absorb(state, number, w, bodies.rule.end - bodies.pace.remaining[i])
         bodies.pace.remaining[i] = 0.0
         return True
     if sent.keeps:

@@ -3,8 +3,6 @@
 import math
 from typing import Any
 
-import numpy as np
-
 from ...common.status import Status
 from ...contact.reflection import from_relative, given, relative, rub, wall_velocity
 from ...contact.wall_impact import Arriving, book, impact_on_wall
@@ -14,6 +12,7 @@ from ...kernel.jit import outlined, select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, dot, either, norm, square, with_square
 from ...lanes.watching.log import Struck
+from ...state import absorb
 from ...surfaces.presence.openings import is_open
 from .clock import moment_of
 from .followed import follow, settle
@@ -98,8 +97,7 @@ def _end(box, flock, clock, wall, i, now, after):
     elif after.wait > 0.0:
         ended = Status.WAITS.value if flock.holds is None else STAYS
         if box.gates is not None and box.gates.absorbed_time is not None and after.wait == math.inf:
-            box.gates.absorbed_time[index(i)] = moment_of(clock, now)
-            box.gates.absorbed_wall[index(i)] = np.int32(box.owner(wall))
+            absorb(box.gates, index(i), box.owner(wall), moment_of(clock, now))
             ended = GONE
     return ended
 
@@ -112,7 +110,7 @@ def _turned(box, flock, books, walls, wall, ball):
         # The friction of a ball that turns is added below.
         laws = laws._replace(friction=None)
     if laws.send_off:
-        random = box.source.of_impact(i, books.impacts[index(i)], laws)
+        random = box.seeding.of_impact(i, books.impacts[index(i)], laws)
     touch = None
     # A turning wall has the same normal velocity at the centre of the ball: only friction and laws need the contact.
     if laws.moving is not None and (laws.friction is not None or laws.send_off):

@@ -23,7 +23,7 @@ class Domain(Record):
     window: Any = None  # the numbers of the window where walls move or become absent: see window.py
     gates: Any = None  # None, or `Gates` where balls may leave the walls
     heavy: Any = None  # None, or `Heavy` where walls have a mass
-    source: Any = None  # None, or `RandomSource` where walls send balls off
+    seeding: Any = None  # None, or `Seeding` where walls send balls off
     repose: Any = None  # None, or `Repose` where balls may come to rest
     turning: Any = None  # None, or the `BallSpins`
     owners: Any = None  # the number in the scene of each wall without a mass; None if no wall has a mass

@@ -2,14 +2,13 @@
 
 import math
 
-import numpy as np
-
 from ...common.status import Status
 from ...kernel.arrays import index
 from ...kernel.gravity import potential
 from ...kernel.jit import outlined, select
 from ...kernel.vector import ZERO, square
 from ...lanes.watching.log import Struck
+from ...state import absorb
 from ..reacting.freedoms import TOO_LONG, TOO_SHORT, ParticleFlight
 from ..reacting.strikes import Ball, all_stay, exit_at, strike, with_energy
 from .again import aim_again, queue_both, vanish
@@ -45,9 +44,8 @@ def strike_heavy(box, flock, books, clock, i, now):
     v1, kept = with_energy(blow.v, left, fall)
     if box.gates is not None and box.gates.absorbed_time is not None and not blow.stays:
         v1, kept = v, left
-        box.gates.absorbed_time[index(i)] = moment_of(clock, now)
-        box.gates.absorbed_wall[index(i)] = np.int32(blow.owner)
-    if box.source is not None and math.isnan(v1.x):
+        absorb(box.gates, index(i), blow.owner, moment_of(clock, now))
+    if box.seeding is not None and math.isnan(v1.x):
         return Status.SENT_WRONG.value
     flock.put(i, now, blow.r, v1)
     flock.keep(i, kept)
@@ -78,8 +76,8 @@ def _blow(box, flock, wall, flight, ball):
     if box.loss is not None:
         spares = box.loss.spares(flock, i, flight.time)
         walls = tuple(one._replace(restitution=select(spares, 1.0, one.restitution)) for one in walls)
-    if box.source is not None:
-        random = box.source.of_impact(i, impacts, box.laws)
+    if box.seeding is not None:
+        random = box.seeding.of_impact(i, impacts, box.laws)
     return strike(walls, wall, heavy.freedoms, flight, box.kinds.mass_of(i), random, Ball(i, radius, box.turning))
 
 

@@ -9,8 +9,6 @@ of the heap, not a prediction for every particle.
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ...common.status import Status
 from ...contact.absence import closeness, hit_wall, lets_through, through
 from ...contact.laws import Laws
@@ -23,7 +21,7 @@ from ...kernel.vector import ZERO, column, put
 from ...lanes.watching.crossings import Flown, ParticleMoment
 from ...lanes.watching.log import Struck, is_full
 from ...lanes.watching.watchers import Followed, Watchers
-from ...state import is_gone
+from ...state import absorb, is_gone
 from ...surfaces.in_motion.moving import Marched
 from ...surfaces.presence.rooms import inside_of, leads_on
 from ...surfaces.time_of_impact import flights, safe
@@ -54,7 +52,7 @@ class SceneWalls(NamedTuple):
     reacting: Any
     pull: Any  # gravity, or None
     size: float = 1.0  # of the scene [m]
-    source: Any = None  # `RandomSource` where walls send particles off by a law
+    seeding: Any = None  # `Seeding` where walls send particles off by a law
     openings: Any = None  # None, or each `Opened` of the given walls
 
     def each_laws(self) -> list[Laws]:
@@ -86,7 +84,8 @@ class Queue(NamedTuple):
     crossed: Any = None  # `Crossed`, where there are counters
     watchers: Watchers = Watchers()
     image: Any = None
-    absorbed: Any = None  # `Absorbed`, where a wall may absorb particles
+    absorbed_time: Any = None  # (N,) [s], where a wall may absorb particles
+    absorbed_wall: Any = None  # (N,) the number of this wall, or -1
     escape_time: Any = None  # (N,) [s], where walls have openings
     starts: Any = None  # (N,) the time from which each particle flies [s], where some are born later or wait at a wall
 
@@ -128,10 +127,6 @@ def _set_out(scenery, queue, i, rule):
             queue.wait[i], queue.due[i], queue.wall[i] = later, later, WAITS
             return
     _aim(scenery, queue, i, rule.end)
-
-
-def _absorb(queue, i, owner, time):
-    queue.absorbed.time[i], queue.absorbed.wall[i] = time, np.int32(owner)
 
 
 def _escape(queue, i, owner, rule, now):
@@ -195,7 +190,7 @@ def _bounce(scenery, queue, i, wall, rule, now):
         put(queue.position, 0, i, r)
     arriving, laws, random = Arriving(r, v, twice, m), scenery.laws, None
     if laws.send_off:
-        random = scenery.source.of_impact(i, queue.impacts[i], laws)
+        random = scenery.seeding.of_impact(i, queue.impacts[i], laws)
     if scenery.openings is not None:
         near = closeness(walls)
         wall = hit_wall(scenery.openings, scenery, walls, (r, v), wall, near)
@@ -209,8 +204,8 @@ def _bounce(scenery, queue, i, wall, rule, now):
             return
     bounce = impact_on_wall(laws, walls, scenery.pull, wall, arriving, random)
     owner, v1, time = index(scenery.owners[int(wall)]), bounce.v, rule.moment - (rule.end - now)
-    if queue.absorbed is not None and bounce.wait == math.inf:
-        _absorb(queue, i, owner, time)
+    if queue.absorbed_time is not None and bounce.wait == math.inf:
+        absorb(queue, i, owner, time)
         v1 = v
     elif queue.starts is not None and bounce.wait > 0.0:
         queue.starts[i] = time + bounce.wait
@@ -233,8 +228,8 @@ def _strike(scenery, walls, queue, i, rule, now):
         if out >= 0.0:
             _escape(queue, i, out, rule, now)
             return
-    if scenery.source is not None:
-        random = scenery.source.of_impact(i, queue.impacts[i], scenery.laws)
+    if scenery.seeding is not None:
+        random = scenery.seeding.of_impact(i, queue.impacts[i], scenery.laws)
     blow = strike(scenery.reacting, queue.struck[i], walls, flight, m, random)
     left = 2.0 * queue.energy[i] - 2.0 * (blow.given + blow.lost) / m
     if queue.heat is not None:
@@ -242,8 +237,8 @@ def _strike(scenery, walls, queue, i, rule, now):
         queue.heat[index(blow.row), i] += blow.heat
     v1, kept = with_energy(blow.v, left, 2.0 * potential(scenery.pull, blow.r))
     time = rule.moment - (rule.end - now)
-    if queue.absorbed is not None and not blow.stays:
-        _absorb(queue, i, blow.owner, time)
+    if queue.absorbed_time is not None and not blow.stays:
+        absorb(queue, i, blow.owner, time)
         v1, kept = v, left
     put(queue.position, 0, i, blow.r)
     put(queue.velocity, 0, i, v1)
@@ -336,7 +331,7 @@ def _carry_out(scenery, freedoms, queue, i, now, rule):
         _strike(scenery, freedoms, queue, i, rule, now)
     elif queue.wall[i] >= 0.0:
         _bounce(scenery, queue, i, queue.wall[i], rule, now)
-    if scenery.source is not None and math.isnan(queue.velocity[0, i]):
+    if scenery.seeding is not None and math.isnan(queue.velocity[0, i]):
         return Status.SENT_WRONG.value
     if not is_gone(queue, i) and not _waits(queue, i):
         _aim(scenery, queue, i, rule.end)

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from ...ball_numbers import INERTIA
 from ...contact.absence import lets_through
-from ...contact.wall_impact import Arriving, by_law
+from ...contact.wall_impact import Arriving, Facing, by_law
 from ...kernel.jit import select
 from ...kernel.record import Record
 from ...kernel.vector import ZERO, Vec, cross, dot, either, norm, square, with_square
@@ -38,16 +38,6 @@ class Ball(Record):
     i: Any
     radius: float
     turning: Any
-
-
-class Facing(Record):
-    """A wall in the velocities of a `Spread`, as its laws take it: its normal."""
-
-    n: Vec
-
-    def unit_normal(self, _wall, _r):
-        """The normal."""
-        return self.n
 
 
 class Rubbed(Record):

@@ -17,6 +17,7 @@ from ...sources.ball_places import place_unborn
 from ...sources.births import with_births
 from ...surfaces.instant import gaps_of, gradient_of
 from ...surfaces.plane import require_start
+from ...surfaces.surface import named
 from .. import engines
 from ..impacts import require_logged
 from ..options import RunOptions, Task
@@ -181,6 +182,6 @@ def _require_normals(scene: Scene, particles: Particles) -> None:
             k = int(lost[0])
             raise SceneError(
                 f"particles must not fly out of a tip of their walls, which has no normal, got particle {on_wall[k]} "
-                f"at {tuple(r[:, k].tolist())}, a tip of surfaces[{i}] ({type(surface).__name__}), with the velocity "
+                f"at {tuple(r[:, k].tolist())}, a tip of {named(i, surface)}, with the velocity "
                 f"{tuple(v[:, k].tolist())}; start it beside the tip, or with a velocity into the volume"
             )

@@ -11,7 +11,7 @@ from ...kernel.vector import vec
 from ...lanes.watching.counters import Counters
 from ...particles import Particles
 from ...scene import Scene
-from ...state import CROSSED, Crossed, State
+from ...state import CROSSED, Crossed
 from ...surfaces.counted import Counted, ReversedCounter, Walled
 from ...surfaces.counter import Counter
 from ...surfaces.facets.mesh import Mesh
@@ -162,19 +162,40 @@ def _one_wall(surface: Surface) -> Any:
 # --- Arrays ----------------------------------------------------------------------------------------------
 
 
-def with_counters(state: State, counters: Counters | None, given: tuple[Counter, ...], scene: Scene) -> State:
-    """Return the state at the start with arrays for these counters."""
-    return state if counters is None else state._replace(crossed=crossed_of(counters, given, scene, state.position))
+class Counting:
+    """The counters of a run, and their arrays.
 
+    Args:
+        scene, given: the scene, and its counters.
+        logs: as in `counters_of`.
 
-def crossed_of(counters: Counters, given: tuple[Counter, ...], scene: Scene, position: NDArray[Any]) -> Crossed:
-    """Return the arrays of counters at the start; a particle on a counter is on its admissible side."""
-    n = position.shape[1]
-    side = np.zeros((len(given), n), np.int8)
-    for k, (one, counter) in enumerate(zip(counters.each, given, strict=True)):
-        surface = _whole(scene, f"counters[{k}]", counter.surface)
-        for first in range(0, n, _AT_ONCE):
-            some = slice(first, first + _AT_ONCE)
-            side[k, some] = distances_of((surface,), position[:, some], 0.0)[0] > one.near
-    rows = 2 * len(given)
-    return Crossed(side, np.zeros((rows, n), np.int64), np.zeros((CROSSED * rows, n)))
+    Attributes:
+        counters: the counters as kernels take them, or None without counters.
+    """
+
+    def __init__(self, scene: Scene, given: tuple[Counter, ...], logs: bool = True) -> None:
+        self._scene, self._given, self.counters = scene, given, counters_of(scene, given, logs)
+
+    def crossed(self, position: NDArray[Any]) -> Crossed | None:
+        """Return the arrays of counters for particles that begin at these places, or None without counters."""
+        rows, n = 2 * len(self._given), position.shape[1]
+        if self.counters is None:
+            return None
+        return Crossed(self._sides(position), np.zeros((rows, n), np.int64), np.zeros((CROSSED * rows, n)))
+
+    def begin(self, crossed: Crossed | None, some: Any, position: NDArray[Any]) -> None:
+        """Set the side of each counter on which the particles with the numbers `some` begin, at these places."""
+        if crossed is not None:
+            crossed.side[:, some] = self._sides(position)
+
+    def _sides(self, position: NDArray[Any]) -> NDArray[np.int8]:
+        """Return whether each particle is outside of each counter; on a counter it is on the admissible side."""
+        assert self.counters is not None
+        n = position.shape[1]
+        side = np.zeros((len(self._given), n), np.int8)
+        for k, (one, counter) in enumerate(zip(self.counters.each, self._given, strict=True)):
+            surface = _whole(self._scene, f"counters[{k}]", counter.surface)
+            for first in range(0, n, _AT_ONCE):
+                some = slice(first, first + _AT_ONCE)
+                side[k, some] = distances_of((surface,), position[:, some], 0.0)[0] > one.near
+        return side

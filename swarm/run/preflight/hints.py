@@ -14,7 +14,7 @@ from ...methods import Impact
 from ...scene import Scene
 from ...surfaces.instant import are_there_together, box_of, gaps_of, side_of
 from ...surfaces.presence.openings import least_distance
-from ...surfaces.surface import LAWS, Surface
+from ...surfaces.surface import LAWS, Surface, named
 from ..options import Task
 from . import softness, workload
 
@@ -271,7 +271,7 @@ def warn_of_walls_in_one_place(scene: Scene, of_points: bool) -> None:
 
 
 def _named(surfaces: Sequence[Surface], number: int, row: int | None) -> str:
-    whole = f"surfaces[{number}] ({type(surfaces[number]).__name__})"
+    whole = named(number, surfaces[number])
     return whole if row is None else f"body {row} of {whole}"
 
 

@@ -14,7 +14,7 @@ from ...scene import Scene
 from ...state import Floats, State
 from ...surfaces.in_motion.drive import drive_of
 from ...surfaces.instant import side_of
-from ...surfaces.surface import Surface, shown
+from ...surfaces.surface import Surface, named, shown
 from ..options import Task
 
 _LOG = logging.getLogger("swarm")
@@ -203,7 +203,7 @@ def of_passing(scene: Scene, method: Method, state: State, particle: int, moment
     thick = f", which is {2.0 * half:.3g} m thick," if surface.is_solid() else ""
     return (
         f", at {shown(place, 6)} m: with {speed:.3g} m/s it goes through the middle of "
-        f"surfaces[{wall}] ({type(surface).__name__}){thick} to its other side: contacts are too soft for the speed; "
+        f"{named(wall, surface)}{thick} to its other side: contacts are too soft for the speed; "
         f"use {enough}, got {penalty:g}, with a dt that fits it, a smaller speed, or Impact"
     )
 

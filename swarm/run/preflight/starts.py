@@ -11,7 +11,7 @@ from ...particles import Particles
 from ...scene import Scene
 from ...surfaces.instant import box_of, gaps_of, gradient_of
 from ...surfaces.shapes.plane import Plane
-from ...surfaces.surface import Surface
+from ...surfaces.surface import Surface, named
 
 # The steps along the gradient in which the way to a wall is found; the step from a point without a gradient, as a part
 # of the size of the scene.
@@ -73,7 +73,7 @@ def error_of(scene: Scene, particles: Particles, outside: NDArray[np.intp], dist
 
 def _named(scene: Scene, wall: int) -> str:
     surface = scene.surfaces[wall]
-    return f"surfaces[{wall}] ({type(surface).__name__})" + ("" if surface.motion is None else ", as it is at 0 s")
+    return named(wall, surface) + ("" if surface.motion is None else ", as it is at 0 s")
 
 
 def _how_far(scene: Scene, wall: int, place: Places) -> str:

@@ -14,6 +14,7 @@ from ...kernel.gravity import Gravity
 from ...kernel.vector import vec
 from ...methods.base import Method
 from ...particles import Particles
+from ...surfaces.surface import named
 from ...surfaces.time_of_impact import flights
 
 _LOG = logging.getLogger("swarm")
@@ -61,8 +62,8 @@ def require_few_impacts(
         i, fastest = int(compiled.numbering.members[0, found.wall]), particles.fastest()
         raise SceneError(
             f"a particle must take at most {_MOST_A_FRAME:g} impacts a frame, got about {every / found.between:.2g}: "
-            f"at its speed it flies {found.between:.2g} s from impact to impact, mostly at surfaces[{i}] "
-            f"({type(compiled.scene.surfaces[i]).__name__}), and a frame lasts {every:g} s; make that surface wider, "
+            f"at its speed it flies {found.between:.2g} s from impact to impact, mostly at "
+            f"{named(i, compiled.scene.surfaces[i])}, and a frame lasts {every:g} s; make that surface wider, "
             f"the particles slower, or every at most {_MOST_A_FRAME * found.between:.2g} s"
             + (f"; the fastest has {fastest:.2g} m/s, {BEYOND_LIGHT}" if fastest > LIGHT else "")
         )

@@ -7,7 +7,7 @@ from ...kernel.arrays import index
 from ...kernel.gravity import displacement
 from ...kernel.jit import Array, outlined, select
 from ...kernel.record import Record
-from ...kernel.vector import Vec, absolute, cross, dot, norm, square
+from ...kernel.vector import Vec, absolute, cross, dot, norm, square, vector_at
 from ..shapes.plane import Flat, PlaneNumbers
 from ..time_of_impact.course import positive, rise_time
 from ..time_of_impact.rising import patch_step
@@ -61,8 +61,7 @@ class CornersOf(Record):
 
     def vertex(self, m, k):
         """Return one corner."""
-        at = index(self.triangles[self.row(m), k])
-        return Vec(self.vertices[at, 0], self.vertices[at, 1], self.vertices[at, 2])
+        return vector_at(self.vertices, index(self.triangles[self.row(m), k]), 0)
 
 
 class CornersOfSides(CornersOf):

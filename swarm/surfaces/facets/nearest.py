@@ -8,7 +8,7 @@ from ...kernel.arrays import index, scratch
 from ...kernel.grid import cell_of
 from ...kernel.jit import kernel, outlined
 from ...kernel.record import Record
-from ...kernel.vector import Vec, column, cross, dot, norm, put, square
+from ...kernel.vector import Vec, column, cross, dot, norm, put, square, vector_at
 from ..fields.members import SignedDistance
 from .free_room import FREE, FULL, KIND
 
@@ -40,7 +40,7 @@ class NearestTriangle(Record):
 def foot_on(facets, mesh, r):
     """Return the `SignedDistance` of a point: the signed distance along the normals of the facets, and its gradient."""
     near = _nearest(facets, mesh, r)
-    normal, height = _row(facets.table, int(near.which)), near.height(r)
+    normal, height = vector_at(facets.table, index(int(near.which)), 0), near.height(r)
     away = norm(r - near.foot)
     sign = 1.0 if height > 0.0 else -1.0
     # On a facet the vector from the foot is round-off, of any direction.
@@ -109,9 +109,9 @@ def _away(boxes, k, r):
 def _nearer(facets, mesh, r, m, near):
     """Return the nearer of the nearest triangle so far and this one; both combined, if they meet at the foot."""
     vertices, triangles = mesh[0], mesh[1]
-    a, b, c = (_row(vertices, triangles[m, k]) for k in range(3))
+    a, b, c = (vector_at(vertices, index(triangles[m, k]), 0) for k in range(3))
     foot = _foot(r, a, b, c)
-    away, normal = square(r - foot), _row(facets.table, m) * _angle_at(foot, a, b, c)
+    away, normal = square(r - foot), vector_at(facets.table, index(m), 0) * _angle_at(foot, a, b, c)
     if near.square < math.inf and square(foot - near.foot) <= _SAME * near.square:
         return NearestTriangle(near.square, near.foot, near.which, near.normal + normal)
     return NearestTriangle(away, foot, float(m), normal) if away < near.square else near
@@ -124,11 +124,6 @@ def _angle_at(foot, a, b, c):
         return math.pi
     one, other = (b - a, c - a) if at_a else ((c - b, a - b) if at_b else (a - c, b - c))
     return np.arctan2(norm(cross(one, other)), dot(one, other))
-
-
-def _row(rows, k):
-    k = index(k)
-    return Vec(rows[k, 0], rows[k, 1], rows[k, 2])
 
 
 def _foot(r, a, b, c):
