@@ -30,7 +30,7 @@ class Strain:
     Args:
         edges: (E, 2) pairs of points, E at least 1.
         rest: (E,) s0, the squares of the lengths of edges without stress, above 0 [m^2].
-        stiffness: (E, E) K, symmetric and without negative eigenvalues [N/m^3].
+        stiffness: (E, E) K, symmetric and positive definite [N/m^3]; its inverse is the compliance of the solver.
 
     Raises:
         SceneError: an argument is out of its range.
@@ -53,7 +53,7 @@ class Strain:
         for k in np.flatnonzero(rest <= 0.0)[:1]:
             raise SceneError(f"strain.rest[{k}] must be above 0, got {rest[k]:g}")
         stiffness = checked.symmetric("strain.stiffness", _shaped("strain.stiffness", self.stiffness, (size, size)))
-        checked.not_negative("strain.stiffness", stiffness)
+        checked.positive_definite("strain.stiffness", stiffness, "a strain, largest at edge", "elastic energy")
         checks.assign(self, edges=edges, rest=rest, stiffness=stiffness)
 
     def energy(self, points: Floats) -> Floats:

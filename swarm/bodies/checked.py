@@ -60,7 +60,8 @@ def mass_matrix(mass: ArrayLike | None, matrix: ArrayLike | None, count: int) ->
         raise SceneError(f"mass_matrix must have shape ({count}, {count}), got {rows.shape}")
     rows = finite("mass_matrix", np.array(rows))
     _masses("the diagonal of mass_matrix", np.diagonal(rows))
-    return _positive_definite("mass_matrix", symmetric("mass_matrix", rows))
+    matrix = symmetric("mass_matrix", rows)
+    return positive_definite("mass_matrix", matrix, "a motion, largest at point", "kinetic energy")
 
 
 def _masses(name: str, masses: Floats) -> Floats:
@@ -96,9 +97,15 @@ def modes_unless_above(bound: float, matrix: Floats) -> tuple[Floats, Floats] | 
     return None
 
 
-def _positive_definite(name: str, matrix: Floats) -> Floats:
+def positive_definite(name: str, matrix: Floats, motion: str, energy: str) -> Floats:
+    """Return a symmetric `matrix` if it is positive definite beyond round-off.
+
+    `motion` and `energy` say in the error what an eigenvector is, up to the number of its largest entry, and what an
+    eigenvalue is.
+    """
     # The matrix is scaled to a diagonal of ones, so that a light point beside a heavy one is no singularity.
-    scale = np.sqrt(np.diagonal(matrix))
+    diagonal = np.diagonal(matrix)
+    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     least = _ROUND_OFF + 8.0 * len(matrix) * EPSILON
     modes = modes_unless_above(least, matrix / scale / scale[:, None])
     if modes is not None and modes[0][0] < _ROUND_OFF:
@@ -106,20 +113,10 @@ def _positive_definite(name: str, matrix: Floats) -> Floats:
         is_singular = modes[0][0] > -_ROUND_OFF
         raise SceneError(
             f"{name} must be positive definite, got one that "
-            f"{'is singular' if is_singular else 'has a negative eigenvalue'}: a motion, largest at point {first}, has "
-            f"{'no' if is_singular else 'a negative'} kinetic energy"
+            f"{'is singular' if is_singular else 'has a negative eigenvalue'}: {motion} {first}, has "
+            f"{'no' if is_singular else 'a negative'} {energy}"
         )
     return matrix
-
-
-def not_negative(name: str, matrix: Floats) -> None:
-    """Raise a `SceneError` if a symmetric matrix has a negative eigenvalue beyond round-off."""
-    modes = modes_unless_above(-_ROUND_OFF * np.abs(matrix).max(), matrix)
-    if modes is not None:
-        raise SceneError(
-            f"{name} must have no negative eigenvalue, got {modes[0][0]:g}: a strain, largest at edge "
-            f"{int(np.abs(modes[1][:, 0]).argmax())}, has a negative energy, so the body would burst"
-        )
 
 
 def point(name: str, value: Any, count: int | None) -> int:

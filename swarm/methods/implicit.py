@@ -149,12 +149,13 @@ class RuleNumbers(fixed_step.SoftNumbers):
         point = _reached(there, wall, r, solution.kappa)
         step = self.end(before, gravity, lane, point, r - point)
         touching = wall >= 0.0
-        # Another wall at s or an unsolved equation needs the careful way.
-        solved = (not solution.unsolved) & (not there.outside(wall, point))
+        # An unsolved equation, or another wall at s or at the end, needs the careful way.
+        solved = (not solution.unsolved) & (not there.outside(wall, point)) & (not after.outside(wall, step.r))
         solved = solved & (not self.passes(walls, lane, wall, step.r, step.v))
-        # The midpoint rule may end outside before it feels a force.
-        inside = not before.outside(-1.0, lane.r)
-        new = inside & (touching | after.outside(-1.0, step.r))
+        # The midpoint rule may end outside before it feels a force; of several walls the careful way finds which.
+        unfelt = (not touching) & (lane.remaining > 0.0) & after.outside(-1.0, step.r)
+        new = (touching | unfelt) & (not before.outside(-1.0, lane.r))
+        wall = select(unfelt & (walls.length() > 1), min(wall, contract.HARD), wall)
         # One wall alone contributes to the kick.
         work = self.work_along(over, wall, -1.0 / self.dt * step.kick, (lane.r, step.r))
         taken = fixed_step.Taken(step.r, step.v, solved, select(touching, norm(step.kick), 0.0), new, work)

@@ -78,7 +78,9 @@ class VerletNumbers(fixed_step.SoftNumbers):
     def contact(self, walls, gravity, lane, wall, solution):
         step = self.step(walls, gravity, lane)
         new = (wall >= 0.0) & (not self.at_start(walls, lane.remaining).outside(-1.0, lane.r))
-        solved = not self.passes(walls, lane, wall, step.r, step.v)
+        # The careful way counts a contact with another wall.
+        solved = not self.after(walls, lane.remaining).outside(wall, step.r)
+        solved = solved & (not self.passes(walls, lane, wall, step.r, step.v))
         taken = fixed_step.Taken(step.r, step.v, solved, norm(step.kick), new, step.work)
         return fixed_step.contact(lane, wall, taken)
 

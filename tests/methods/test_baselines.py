@@ -94,6 +94,39 @@ def test_a_corner_is_pushed_by_both_walls(rule):
         assert impulse[axis] == pytest.approx(velocity[axis] - corner[-1].velocity[axis], rel=1e-12)
 
 
+@pytest.mark.parametrize("angle", [50.0, 90.0])
+@every_rule
+def test_each_contact_in_an_edge_is_an_impact_on_its_wall(rule, angle):
+    """One begins where a step, or for the midpoint rule its middle, is outside of a wall: also while another lasts."""
+    turn, seen = np.radians(angle), []
+    normals = np.array([[1.0, 0.0, 0.0], [-np.cos(turn), np.sin(turn), 0.0]])
+    scene = swarm.Scene([swarm.Plane(normal, 0.0) for normal in normals])
+    inwards = -normals.sum(axis=0) / np.linalg.norm(normals.sum(axis=0))
+    across = np.array([inwards[1], -inwards[0], 0.0])
+    start = np.array([0.03 * inwards + 0.004 * k * across for k in (-2, -1, 0, 1, 2) for _ in range(3)]).T
+    velocity = np.array([-inwards + part * across for _ in range(5) for part in (-0.3, 0.1, 0.4)]).T
+    simulated = swarm.simulate(
+        scene,
+        swarm.Particles(start, velocity),
+        RULES[rule](dt=5e-3, penalty=2e4),
+        until=0.3,
+        every=5e-3,
+        compile="never",
+        member_impacts=True,
+        observables={"x": lambda frame: (seen.append(frame.position), 0.0)[1]},
+    )
+    ways = np.array(seen[-61:])
+
+    def outside(places):
+        return np.einsum("wk,tkn->twn", normals, places) > 0.0
+
+    pushed = outside(0.5 * (ways[1:] + ways[:-1])) if rule == "midpoint" else False
+    begun = ~outside(ways[:-1]) & (outside(ways[1:]) | pushed)
+    assert begun.sum(axis=(0, 1)).tolist() == simulated.impacts_per_particle.tolist()
+    assert begun.sum(axis=(0, 2)).tolist() == [impacts.sum() for impacts in simulated.member_impacts]
+    assert (outside(ways).sum(axis=1) > 1).any()
+
+
 @every_rule
 def test_a_contact_changes_the_energy_and_penalty_does_not(rule):
     """Why they are here: at dt sqrt(alpha/m) = 0.7 one bounce changes the energy by more than round-off."""

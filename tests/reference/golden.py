@@ -68,6 +68,8 @@ Two cells of sources of bodies were written again when centres of mass left BLAS
 impact, not only the first of those that overlap: the same ends by the bits, and the same observables but for "impacts".
 So was the cell of `Penalty` in a box with a log, and that with a temperature, where contacts that overlap no longer
 share a random number: two of them were one draw.
+Three runs of `Midpoint` that fall into edges were written again when a contact that begins where a step ends counted
+also while another wall is touched: the same ends by the bits, and the same observables but for "impacts".
 
 The runs "cell: ..." are those of cells of `bench.cells` that work, one kind of wall for each engine and capability, and
 their digests are of the final state, the observables and the datasets of the trajectory, but for dates, versions,
