@@ -1,1 +1,1 @@
-"""From a scene file: its run in Python, what it will do, its schema, files to begin with, and the reference."""
+"""From a scene file: its run in Python, its outlook, its schema, files to begin with, and the reference."""

@@ -231,7 +231,7 @@ def _form(kind: Any) -> Form | None:
 
 
 def keys_of(cls: type[Any], meanings: Mapping[str, str] | None = None) -> tuple[TableKey, ...]:
-    """The keys of a class with objects that tables describe, with their `meanings`, or those of its docstring."""
+    """The keys of a class for objects from tables, with their `meanings`, or those of its docstring."""
     known, found = meanings_of(cls) if meanings is None else meanings, []
     for field in kept_fields(cls):
         name = field.metadata.get("key", field.name)

@@ -67,7 +67,7 @@ def taken_by(stop: Callable[[], None]) -> Iterator[None]:
     Python raises KeyboardInterrupt between any two of its instructions. Inside a callback of the garbage collector,
     which runs often while Numba compiles, the exception is printed and lost, and the run continues.
     """
-    if threading.get_ident() != threading.main_thread().ident:
+    if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread may set handlers, and only it is interrupted
         return
     # The caller handles the others, or ignores them.

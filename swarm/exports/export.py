@@ -63,7 +63,7 @@ def export(
         if any(map(is_many, trajectory.scene.surfaces)):
             targets.append(target.with_suffix(".solids.vtkhdf"))
         with needed_by("an export with surfaces, which --no-surfaces or surfaces=False leaves out,", "plot"):
-            from . import walls  # noqa: F401  what is missing is found before anything is written
+            from . import walls  # noqa: F401  missing packages are found before the first file is written
     for one in (*targets, *stale):
         paths.check_distinct({"export": one}, {"trajectory": trajectory.path})
         marks.check_target(one, overwrite, "export")

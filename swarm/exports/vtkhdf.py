@@ -96,7 +96,7 @@ def timed(root: Any, chosen: Exported, firsts: NDArray[np.int64]) -> Any:
 
 
 def as_typed(time: float) -> float:
-    """The decimal of few digits that equals a time but for round-off, or the time: 0.3 for frame 3 at every 0.1 s.
+    """The decimal of few digits that equals a time up to round-off, or the time: 0.3 for frame 3 at every 0.1 s.
 
     Programs look for the last step at or before a time that a user types, and 0.30000000000000004 is after it.
 

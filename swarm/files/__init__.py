@@ -1,1 +1,1 @@
-"""Files of runs: trajectories, logs of impacts, checkpoints, and what keeps them whole."""
+"""Files of runs: trajectories, logs of impacts, checkpoints, and the means that keep them complete."""

@@ -118,7 +118,7 @@ def _added(task: Task, parts: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 class JoinedWriter(TrajectoryWriter):
-    """A writer of particles that are in the shards; it writes all other data.
+    """A writer for particles that are in the shards; it writes all other data.
 
     Its file gets its name when it is complete: after a kill, a later session would take a part of the frames for a run
     that cannot be resumed. The checkpoint, which holds the shards, is left to the session.

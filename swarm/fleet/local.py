@@ -18,7 +18,7 @@ from ..errors import RunError
 _ROOT = Path(__file__).parents[2]
 # Seconds for its processes to end by themselves.
 _ENDS = 10.0
-# A scheduler runs any code that is sent to it, so it listens on this machine only, whatever Dask's default is.
+# A scheduler runs any code that is sent to it, so it listens on this machine only, independent of Dask's default.
 _HERE = "127.0.0.1"
 
 

@@ -227,7 +227,7 @@ def _begin(line: "Connection[Any, Any]", printed: Path) -> None:
     with contextlib.suppress(OSError):  # the parent has ended, which the other thread notices too
         line.send(_READY)
     with interrupt.importing():
-        from . import sweep_run  # noqa: F401  what the jobs need
+        from . import sweep_run  # noqa: F401  the modules of the jobs
 
 
 def _listen(line: "Connection[Any, Any]", printed: Path) -> None:

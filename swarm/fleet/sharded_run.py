@@ -42,7 +42,7 @@ _READING = 0.1
 
 
 class Sharded(Session):
-    """A session with a checkpoint that holds the bounds of the shards, which have checkpoints of their own."""
+    """A session with the bounds of the shards in its checkpoint; the shards have checkpoints of their own."""
 
     # The bounds of the previous session, or of this one once it has begun.
     _bounds: Any = None

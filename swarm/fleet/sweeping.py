@@ -89,7 +89,7 @@ def sweep(  # noqa: PLR0913  the keywords are the public interface
 
         [sweep]
         combine = "product"     # every value with every other; or "zip"
-        # keys of the scene file: a table or list and what is in it
+        # keys of the scene file: a table or list, and its entry
         "surface.0.restitution" = [0.5, 0.7, 0.9]
         "particles.seed" = {range = 20}    # 0 to 19
         "run.until" = {linspace = [1.0, 2.0, 5]}    # or geomspace

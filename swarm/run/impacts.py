@@ -142,20 +142,17 @@ class ThreadLog:
     """The log that one thread fills, in the frame that ends at a time [s].
 
     Attributes:
-        log: the log that is being filled; None in a run without a log, in which `turn` and `close` do nothing.
+        log: the log that is being filled; None in a run without a log, in which `call` only calls the kernel.
     """
 
     def __init__(self, impacts: Impacts | None, end: float) -> None:
         self._impacts, self._end = impacts, end
-        self.log: Any = None
-        self._begin()
-
-    def _begin(self) -> None:
-        if self._impacts is not None:
-            self.log = self._impacts.empty(self._end)
+        self.log: Any = None if impacts is None else impacts.empty(end)
 
     def call(self, kernel: Any, *arguments: Any) -> tuple[int, int, int]:
         """Call a kernel, again with an empty log each time the log is full; return its result."""
+        if self.log is None:
+            return kernel(*arguments)  # type: ignore[no-any-return]
         while True:
             status, particle, drawn = kernel(*(self._with_log(one) for one in arguments))
             if status != Status.LOG_FULL:
@@ -169,8 +166,9 @@ class ThreadLog:
 
     def turn(self) -> None:
         """Hand over the rows so far, and begin an empty log."""
-        self.close()
-        self._begin()
+        if self._impacts is not None:
+            self.close()
+            self.log = self._impacts.empty(self._end)
 
     def close(self) -> None:
         """Hand over the rows so far."""
