@@ -72,7 +72,8 @@ class Run(BaseRun):
         super().__init__(compiled, method, n, threads, tier, seeding, watched)
         self._booked = lanes.booked(self._walls)
         self.state = state_of(compiled, particles, method, self._booked, self._numbers.laws_at_ends is not None)
-        self.state = self.state._replace(crossed=self._counting.crossed(particles.position))
+        if watched.counters:
+            self.state = self.state._replace(crossed=self._counting.crossed(particles.position))
         observables.start_energies(compiled, self._law, self.state)
         self._faces = scene.open_faces()
         # A block consists of whole chunks, so that each thread observes the particles that it has advanced.
