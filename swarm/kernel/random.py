@@ -81,7 +81,7 @@ class Seeding(Record):
     in the whole run.
     """
 
-    seed: Any = 0  # a signed integer of 64 bits, as kernels take it
+    seed: Any = 0  # a signed integer of 64 bits
     first: Any = 0
 
     def of_impact(self, i, number, laws):

@@ -170,7 +170,7 @@ class Counting:
         logs: as in `counters_of`.
 
     Attributes:
-        counters: the counters as kernels take them, or None without counters.
+        counters: the records of the counters for kernels, or None without counters.
     """
 
     def __init__(self, scene: Scene, given: tuple[Counter, ...], logs: bool = True) -> None:
