@@ -181,13 +181,24 @@ def _unhindered(walls, gravity, touch, r, v, h, near):
                 if time < following:
                     following, other = time, i
         if other < 0:
-            break
-        if following * norm(u) <= near:
+            # At the tip of a cone the discrete gradient turns round between two sweeps, so that u may lead through it.
+            if touch.frame is not None or not _is_behind(walls, touch, r + h * u, near):
+                break
+            h = 0.5 * h
+        elif following * norm(u) <= near:
             touch.touched[other] = True
         else:
             # The step to that wall is different, since its walls curve and gravity has less time.
             h = following if cut < _CUTS // 2 else 0.5 * following
     return u, h
+
+
+def _is_behind(walls, touch, r, near):
+    """Whether a step that ends at r leads through a touched wall, by more than the distance `near`."""
+    for i in range(touch.touched.size):
+        if touch.touched[i] and walls.distance(touch.number[i], r) > near + max(touch.depth[i], 0.0):
+            return True
+    return False
 
 
 @outlined

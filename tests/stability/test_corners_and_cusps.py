@@ -85,3 +85,21 @@ def test_impact_turns_round_in_the_cusp():
     assert passes[-1].velocity[1] > 0.5
     assert passes[-1].velocity @ passes[-1].velocity == pytest.approx(1.0, rel=4.0 * EPSILON)
     assert farthest_out(CUSP, passes) <= 2.0 * EPSILON
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_step_leads_through_the_tip_of_a_cone(seed):
+    """Particles that slide into the tip stay there: after steps through it frames ended 1e-6 m outside."""
+    random, mu, g = np.random.default_rng(seed), 0.4, 9.81
+    walls = {"restitution": 0.5, "friction": mu}
+    scene = swarm.Scene([swarm.Cone(math.pi / 6.0, **walls), swarm.Plane((0.0, 0.0, 1.0), 1.5, **walls)], (0, 0, -g))
+    angle, way, speed = random.uniform(0.0, 2.0 * math.pi), random.uniform(0.02, 0.05), 3.0
+    down = -np.array([0.5 * math.cos(angle), 0.5 * math.sin(angle), math.cos(math.pi / 6.0)])
+    pull = g * (math.cos(math.pi / 6.0) - 0.5 * mu)
+    arrival = (math.sqrt(speed**2 + 2.0 * pull * way) - speed) / pull
+    start = swarm.Particles(-way * (1.0 - 1e-12) * down, speed * down)
+    for late in (5e-4, 1e-3):
+        until = arrival * (1.0 + late)
+        result = swarm.simulate(scene, start, until=until, every=until, compile="never")
+        assert np.linalg.norm(result.particles.position) < 1e-9
+        assert result.observables["max_penetration"].max() < 1e-10
