@@ -337,5 +337,5 @@ def test_a_file_has_the_name_of_a_law(tmp_path):
     read = swarm.load(tmp_path / "run.h5").scene
     assert read.surfaces[0].laws == ("Restitution(e=0.9)",)
     assert swarm.fill(read, 5, speed=1.0, seed=1).position == pytest.approx(start.position)
-    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws: 'Restitution\(e=0.9\)' is Python"):
+    with pytest.raises(swarm.SceneError, match=r"surfaces\[0\].laws: 'Restitution\(e=0.9\)' is a Python object"):
         swarm.simulate(read, start, swarm.Impact(), until=1.0)
