@@ -88,7 +88,7 @@ def three_walls(rigid, pull):
     [(name, pull) for name in METHODS for pull in (None, FALLING) if pull is None or "Lagrangian" not in name],
 )
 def test_units_change_no_bit_of_three_walls(name, pull):
-    require_the_same_bits(name, three_walls(name.startswith("impact"), pull), NUMBER * 8)
+    require_the_same_bits(name, three_walls(name.startswith("impact"), pull), NUMBER * 7)
 
 
 def require_the_same_bits(name, scene_of, impacts):
