@@ -215,9 +215,9 @@ class ImpactLog(Stored):
             A contact of two grains, or of a grain with a wall, lasts, and has its row where it ends, as laws of walls
             act there: `time` is the end of the step, `velocity_before` the velocity at the start of the contact,
             `impulse` the sum of its normal impulses, and further columns are `duration` [s], `largest_force` [N] along
-            the normal and `friction_loss` [J], the energy that friction and rolling resistance have taken. For a mesh or
-            an outline `member` is the face at the end. A contact has no row if it lasts at the end of the run, or if the
-            wall goes, by an opening or because it is no longer `present`.
+            the normal and `friction_loss` [J], the energy that friction and rolling resistance have taken. For a mesh
+            or an outline `member` is the face at the end. A contact has no row if it lasts at the end of the run, or
+            if the wall goes, by an opening or because it is no longer `present`.
 
             A contact of a point with a soft wall has its row at its end too, with the whole impulse of that wall. If
             laws do not end it, because the wall goes or another wall absorbs the point, both velocities are the same.
