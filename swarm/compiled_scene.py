@@ -39,7 +39,7 @@ _NO_HEAT = Thermal(0.0, 0.0)
 
 
 class PartsOfRows(NamedTuple):
-    """The part of each row, or `number` if its surface has no parts, and the number of parts."""
+    """The part of each row (`number` if its surface has no parts), and the number of parts."""
 
     rows: tuple[int, ...]
     number: int
@@ -63,7 +63,7 @@ class Numbering:
         surfaces_of_rows: the surface of each row.
         parts_of_rows: the part of each row; None if no surface has parts.
         pieces_of_walls, rows_of_walls: the piece and the row of each wall, (walls,).
-        members: the surface of each wall, and its number in a field, else its part, else -1: (2, walls).
+        members: (2, walls), the surface of each wall; and its number in a field, or else its part, or else -1.
     """
 
     def __init__(self, pieces: Pieces, order: Order, parts: Sequence[tuple[int, Place]]) -> None:
@@ -107,8 +107,8 @@ class CompiledScene:
     Args:
         scene: the description.
         largest: the largest radius of the balls in the scene [m]; None: the particles are points.
-        apart: the method that does not take listed solids of one kind as a field, in words for errors; None: more than
-            a few such solids are a field.
+        apart: the words of errors for a method that takes listed solids of one kind as single walls, `REACTING` and
+            `CUT` among them; None: more than a few such solids are a field.
 
     Attributes:
         scene, largest: as the arguments.
@@ -121,7 +121,7 @@ class CompiledScene:
 
     def __init__(self, scene: "Scene", largest: float | None = None, apart: str | None = None) -> None:
         self.scene, self.largest, self._apart = scene, largest, apart
-        # The walls of a scene without motion, by which of the pieces are present.
+        # The walls of a scene without motion; the key says of each piece whether it is present.
         self._known: dict[tuple[bool, ...], Walls] = {}
         in_steps = largest is None and is_in_steps(apart)
         reach = scene.reach_of_steps() if in_steps else largest

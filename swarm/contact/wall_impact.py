@@ -107,7 +107,7 @@ class _Own(Record):
 
 
 def _own_law(laws, one, wall, at, arriving, random, acts):
-    """Return `_Own` by the laws `one` of a wall, with the normal and the velocity `at` it; arbitrary without laws."""
+    """Return `_Own` by the laws `one` of a wall, arbitrary if they do not act; `at` is its normal and its velocity."""
     n, moving = at
     # Laws that do not act get valid numbers: with NaN, a law of the user might not end.
     n = either(acts, -1.0 * n, _NORMAL)
@@ -156,7 +156,7 @@ def book(laws, books, place, mass, bounce):
 
 
 def give_work(books, row, column, work):
-    """Book the work of a moving wall [J]: its row is as far behind that of the impulse as there are walls."""
+    """Book the work of a moving wall [J]; the rows of the works of all walls follow the rows of their impulses."""
     books.impulse[index(books.impulse.shape[0] // 2) + row, column] += work
 
 

@@ -49,8 +49,8 @@ from .step import MarchRule, World, march
 _SKIN = 0.4
 # Room in the lists: pairs of each ball, contacts with walls of each ball, and the factor by which room grows.
 _PAIRS, _AT_WALLS, _MORE = 6, 1, 1.5
-# The part of a step by which a birth may be due after the start of a step and still come with it; a time in steps
-# beyond any run.
+# A birth that is due at most this part of a step after the start of the step comes at its start. A number of steps
+# that no run has.
 _WHOLE, _LATE = 1e-6, 1e18
 # The widest skin, in radii of the largest ball: beyond it lists save nothing.
 _WIDEST = 16.0

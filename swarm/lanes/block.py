@@ -103,7 +103,7 @@ def _halts(share, lanes, place, live, passes):
 
 @outlined
 def _rare(hard, method, walls, gravity, share, lanes, live, some_hard):
-    """Make the part of a pass that is seldom needed; return (the worst status, its lane)."""
+    """Look for failed lanes, or make the contacts of hard lanes; return (the worst status, its lane)."""
     if not some_hard:
         return _look(method, walls, share.state, lanes, live)
     if hard is None:
@@ -115,9 +115,9 @@ def _rare(hard, method, walls, gravity, share, lanes, live, some_hard):
 def _look(method, walls, state, lanes, live):
     """Find a particle with too many impacts, or without progress since the last look; return (status, its lane).
 
-    The narrower a wedge is, the more impacts have no time between them. They come to an end, so they are counted.
-    In a gap of zero width a particle returns to its state at the last look. In a cusp thinner than round-off it would
-    not have turned round after the largest number of impacts. A particle that loses energy meanwhile may come to rest.
+    In a narrow wedge a finite number of impacts have no time between them: they are no failure up to a largest number.
+    In a gap of zero width a particle returns to its state at the last look (`goes_round`). In a cusp thinner than
+    round-off the largest number of impacts would not turn it round (`hardly_turns`); if it loses energy, it may rest.
     """
     # Walls that close on a particle hit it without end. The smaller limit keeps this to seconds with safe steps too.
     most_hits = 0.1 * MOST_HITS if isinstance(walls, Carried) else MOST_HITS
@@ -167,7 +167,7 @@ def _hard_passes(hard, method, walls, gravity, share, lanes, live):
             if status > worst:
                 worst, where = status, i
     if worst == Status.TOO_DEEP.value:
-        # The message of the error needs them.
+        # The message of the error names the place and the velocity.
         put(share.state.position, 0, lanes.particle[where], lanes.lane(where).r)
         put(share.state.velocity, 0, lanes.particle[where], lanes.lane(where).v)
     return worst, where

@@ -207,7 +207,7 @@ def _aim_at_moving(walls, gravity, lanes, live):
 
 
 def _of_flights(ask, walls, gravity, lanes, live, *given):
-    """Call a function with the flight of every lane."""
+    """Call `ask` with the flight of every lane."""
     for i in range(index(live)):
         lane = lanes.lane(i)
         ask(walls, gravity, lanes.course, i, lane.r, lane.v, lane.remaining, *given)
@@ -339,7 +339,7 @@ def _aim(walls, gravity, lanes, live):
 
 
 def _try_on(walls, gravity, lanes, some, tries):
-    """Make the last tries of the first `some` lanes of `lanes.order`, each as often as if it were alone."""
+    """Make the last tries of the first `some` lanes of `lanes.order`; other lanes do not change their number."""
     course = lanes.course
     for k in range(some):
         lane = index(lanes.order[k])

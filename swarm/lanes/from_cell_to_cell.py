@@ -34,7 +34,7 @@ MIDDLE = _BACK
 
 
 class UnderWay(Record):
-    """The lanes that are under way, closed up: they fly straight or fall, past facets at rest."""
+    """The lanes that are under way, in columns without gaps: they fly straight or fall, past facets at rest."""
 
     rows: Array  # the rows of each lane
     time: Array  # the time of its flight so far
@@ -84,7 +84,6 @@ class UnderWay(Record):
 
     def may_meet(self, gravity, mesh, i, cone):
         """Whether a lane may move towards a facet with a normal in this cone on its way through its cell."""
-        # At the start of the way or at its end
         v = column(self.rows, SPEED, i)
         if gravity is None:
             return not cone.is_left(v)
@@ -110,7 +109,7 @@ class UnderWay(Record):
     # --- From step to step ---
 
     def move(self, source, target):
-        """Move a lane to the place of another one."""
+        """Copy lane `source` to the place `target`."""
         for k in range(self.own):
             self.rows[k, target] = self.rows[k, source]
         self.time[target], self.owner[target] = self.time[source], self.owner[source]

@@ -17,9 +17,9 @@ from .sliding import ENDS, FAILED, LEAVES, LIFTED, MET, OPENS, STOPPED, STUCK
 from .sliding_step import SHORTEST, twice_after
 from .sticking import stay
 
-# The most cuts of a step before the lane is given up; about four are usual.
+# The most cuts of a step before the lane becomes CAREFUL; about four are usual.
 _MOST_TRIALS = 100
-# The first step of a particle that begins to slide, in crossings; the walls correct its length.
+# The first step of a particle that begins to slide, in crossings; the walls correct the length of the next steps.
 _FIRST = 1e-3
 # The factor that shortens a step that is tried again.
 _RETRY = 0.25
@@ -27,7 +27,7 @@ _RETRY = 0.25
 
 @outlined
 def set_going(slide, i):
-    """Compute the forces on a lane at the start of its next step; return its phase, which may be to rest."""
+    """Compute the forces on a lane at the start of its next step; return its phase, ARRIVED if it comes to rest."""
     walls, lanes, lane = slide.walls, slide.lanes, slide.lanes.lane(i)
     r, v, remaining = lane.r, lane.v, lane.remaining
     now = walls.at(remaining)
@@ -57,9 +57,9 @@ def set_going(slide, i):
 
 @outlined
 def decide(slide, i):
-    """Return the phase of a lane with a step that cannot be taken as it is.
+    """Cut the step of a lane at its first event, or let the event happen at the start of the step; return the phase.
 
-    The step is cut at the event, and taken again, until the event is at its start.
+    A step that is cut is tried again, and may be cut again, until the event is at its start.
     """
     method, walls, lanes, lane = slide.method, slide.walls, slide.lanes, slide.lanes.lane(i)
     event, h = lanes.event[i], lane.h
@@ -82,7 +82,7 @@ def decide(slide, i):
             return phase
     if event & MET:
         met = crossing.arrival(walls, active, path, near, lane.remaining)
-        # The hit is at once, or so soon that the time left does not change.
+        # The hit is at the start of the step, or so soon after it that the time left does not change.
         if lane.remaining - met.time * h == lane.remaining:
             slide.state.contacts.met[lanes.particle[i]] = met.wall
             lane.r = walls.at(lane.remaining).project(met.wall, r)
@@ -98,7 +98,7 @@ def decide(slide, i):
 
 
 def _until_gone(slide, event, active, path, remaining):
-    """Return the part of a step after which a wall ends or is open or the lane leaves the cell, or infinity."""
+    """Return the part of a step after which a wall ends, is open, or the lane leaves the cell; infinity for none."""
     lanes, near, found = slide.lanes, crossing.near(slide.method, path.r0), np.inf
     if event & ENDS:
         found = part_until_end(slide.walls, active, path, near, remaining)
@@ -112,7 +112,7 @@ def _until_gone(slide, event, active, path, remaining):
 
 @outlined
 def _past_ends(slide, now, i):
-    """Return the phase of a lane with walls that may end at its place: on the walls that follow, or FLYING."""
+    """Replace the walls of a lane that end at its place by the walls that follow; return its phase, FLYING for none."""
     lane, near = slide.lanes.lane(i), crossing.near(slide.method, slide.lanes.lane(i).r)
     for _wall in range(2):
         ended = ended_wall(now, slide.active(lane), lane.r, near)
@@ -162,13 +162,13 @@ def _take(slide, i):
 
 
 def _give_up(slide, i):
-    """Leave a lane to the careful way: it is at an apex, or its walls have no edge there."""
+    """Return CAREFUL for a lane that is at an apex, or at a place where its walls have no edge."""
     slide.state.contacts.met[slide.lanes.particle[i]] = slide.lanes.lane(i).first
     return CAREFUL
 
 
 def _shorten(slide, i):
-    """Shorten a step without a solution, or let the lane fly over the edge of a solid, if there is no wall beyond."""
+    """Shorten a step without a solution; if it is too short, let the lane fly off an edge, or give it up."""
     lane, h = slide.lanes.lane(i), slide.lanes.lane(i).h
     lane.step, lane.cut = _RETRY * h, np.inf
     if h > SHORTEST * slide.method.size / math.sqrt(lane.scale2):
@@ -182,7 +182,10 @@ def _shorten(slide, i):
 
 
 def _lift(phase, lane, none):
-    """Return (the phase of a lane that walls let go now, the part of the step after which they let go)."""
+    """Drop a wall that does not press on a lane now; return (its phase, the part of the step that the walls hold it).
+
+    A press of at most `none` counts as 0.
+    """
     first, second = lane.press <= none, lane.press_second <= none
     part = _part(lane.press, lane.press1)
     if phase == HELD:
@@ -197,5 +200,5 @@ def _lift(phase, lane, none):
 
 
 def _part(start, end):
-    """Return the place where a straight line from `start` falls through 0, or 1."""
+    """Return the part of a step after which a linear function from `start` to `end` falls below 0; 1 for none."""
     return start / (start - end) if end < 0.0 else 1.0

@@ -22,10 +22,10 @@ from . import base, contract
 
 # Bounds of the sliding tolerance: round-off, and steps that no longer follow the wall.
 _FINEST, _COARSEST = 1e-13, 1e-3
-# The impulse, relative to the slow speed, that is round-off at a wall: counting it would count by chance. Impulses on
-# particles that a wall lets go are 1e-16 to 1e-14 of the speed, the slow speed is 1e-4 of it.
+# An impulse up to this part of the slow speed is round-off at a wall, and no impact: to count it would be chance.
+# Impulses on particles that a wall lets go are 1e-16 to 1e-14 of the speed, the slow speed is 1e-4 of it.
 _NO_IMPACT = 1e-8
-# A particle makes no progress in this fraction of a crossing.
+# A time of at most this fraction of a crossing is no progress.
 _INSTANT = 1e-9
 
 
@@ -170,15 +170,15 @@ class Reflection(contract.MethodNumbers):
     fall2: float  # |G| size, the square of a speed
     shortest_flight: float  # [s]
     shortest_length: float  # of a flight [m]
-    sliding_tolerance: float  # a crossing
+    sliding_tolerance: float  # relative error of a crossing
     laws: Laws
     contact_step: Any  # h of a chord [s], or None
 
     # --- The numbers of a lane ---
 
     def constants(self, mass, energy, scale2):
-        # Twice the energy per mass, 1/(2 |v|^2) if it is constant, and the slow speed of this particle. This speed does
-        # not follow from the velocity at the start of the frame: no contact may depend on where frames end
+        # Twice the energy per mass, 1/(2 |v|^2) if |v| is constant, and the slow speed. That does not follow from the
+        # velocity at the start of the frame, as no contact may depend on the times of frames.
         twice_energy = 2.0 * energy
         moving = twice_energy > 0.0
         half_inverse = select(moving, 0.5 / select(moving, twice_energy, 1.0), 0.0)
@@ -236,9 +236,9 @@ class Reflection(contract.MethodNumbers):
         return select(speed2 > 0.0, speed2, 0.0)
 
     def is_within(self, lane, speed2, speed, part):
-        """Whether a speed is at most `part` of twice the speed away from a wall below which a contact may last.
+        """Whether `speed` is at most `part` of `slow`: twice the speed away from a wall below which a contact may last.
 
-        A flight of length T in the pull |v|^2/size + |G| leaves the wall with T/2 of it; `slow` is twice that speed.
+        In the pull |v|^2/size + |G| a flight of duration T leaves the wall with the speed T/2 times the pull.
         """
         if not self.laws.change_energy:
             return speed <= part * lane.own.slow

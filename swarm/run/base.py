@@ -54,7 +54,7 @@ class BaseRun:
         n: the number of particles, or bodies.
         threads: the number of threads.
         tier: the tier of the kernels.
-        seeding: the number of the first particle, or body, in the whole run.
+        seeding: the seed, and the number of the first particle, or body, in the whole run.
         watched: the log and the tally of impacts, and the counters.
         pool: the pool of threads; None: a new one.
 

@@ -1,7 +1,7 @@
-"""The choice of the engine of a run. Only this module loads the engines of wings, by their names.
+"""The choice of the engine of a run.
 
 The engine of points that are independent of one another is `Run` of the core, or `DoorRun` where walls become absent.
-Bodies, balls and walls with a mass are wings: the core imports none of their modules.
+Bodies, balls and walls with a mass are wings: packages that the core does not import. Only this module loads them.
 """
 
 import importlib

@@ -27,7 +27,7 @@ from .tiers import CHOICES
 
 # The shortest interval of checkpoints [s]: with shorter ones a run would do little else.
 _OFTEN = 0.01
-# The option is no key of [run]: it belongs to one session, not to the run.
+# The metadata of an option that is no key of [run], as it belongs to one session, not to the run.
 _OF_A_SESSION = {"in_file": False}
 
 
@@ -136,7 +136,7 @@ class RunOptions(Validated):
         return Storage(self.frames, self.precision, self.compression)
 
     def files(self) -> dict[str, Path | None]:
-        """Return the trajectory, its checkpoint, which may not be made, and the log of impacts."""
+        """Return the paths of the trajectory, of its checkpoint, and of the log of impacts, by their roles."""
         saved = None if self.trajectory is None else paths.checkpoint_of(self.trajectory)
         return {"trajectory": self.trajectory, "checkpoint": saved, "log of impacts": self.impacts}
 

@@ -141,7 +141,7 @@ class Session:
     def _check(self, path: Path, overwrite: bool, what: str) -> None:
         """Raise a `SceneError` if the session cannot write a file, or may not replace it."""
         if self._resumes and (not overwrite or self._path.exists()):
-            paths.check_place(path, what)  # the session reads the file, and goes on in it
+            paths.check_place(path, what)  # a resumed session appends to the file
         else:
             marks.check_target(path, overwrite, what)
 
@@ -227,6 +227,7 @@ class Session:
             if self._log is not None:
                 self._log.total = self._job.rows
             run.restore(self._arrays, self._job.following is not None)
+            # The arrays are freed; `_arrays` is still not None, as this session is a resumed one.
             self._arrays = {}
         self._is_under_way, self._has_checkpoint = True, self._arrays is not None
 

@@ -166,7 +166,7 @@ class BodyLanes(NamedTuple):
     multiplier: Any  # (M, B)
     recent: Any  # (M, B) multipliers of the last step
     before: Any  # (M, B) multipliers of the last step but one
-    older: Any  # (M, B) multipliers of the step before; NaN if there was no step since the last blow
+    older: Any  # (M, B) multipliers of the last step but two; NaN if there was no step since the last blow
     offset: Any  # (M or 0, B) 4 l lambda/alpha of relaxed links
 
 
@@ -188,15 +188,15 @@ class LaneNumbers(NamedTuple):
     previous: Floats  # the error before the last correction
     rate: Floats  # the estimate by which a correction shrinks the error
     residue: Floats  # the error of the equations of ties and guides, in units of round-off
-    unsettled: Floats  # the same error with the equations of contacts
+    unsettled: Floats  # the error of the equations of ties, guides and contacts, in the same units
     trial: Floats  # the length to try [s]; 0: a whole step
     low: Floats  # the lower end of the bracket of the time of impact [s]
     high: Floats  # its upper end [s]
     inside: Floats  # the largest gap of a contact at the lower end of the bracket [m], below 0
     outside: Floats  # the largest gap at its upper end [m]
     done: Flags  # whether the ties of this stage are solved, or put off
-    last: Flags  # whether they are after this correction
-    solved: Flags  # whether the ties of all stages are
+    last: Flags  # whether the ties of this stage are solved after this correction
+    solved: Flags  # whether the ties of all stages are solved
     out: Flags  # whether a point is outside
     body: Counts  # the number of the body, -1 for none
     point: Counts  # the point of the impact, -1 for none

@@ -27,10 +27,10 @@ from .knows import Asked, require_supported
 from .softness import depths_at_start
 from .starts import require_inside
 
-# The length of the way ahead that shows on which side of a wall a flight begins, as a part of the size of the scene. A
-# flight that begins in a tip is outside at its end by more than the part `_TIP` of this way.
+# A trial flight of the length `_NEAR`, in sizes of the scene, shows on which side of a wall a particle starts. If it
+# starts in a tip and flies out, the end of this flight is outside by more than the part `_TIP` of its length.
 _NEAR, _TIP = 1e-6, 1e-2
-# The earliest time of a path, in lengths of the run: there float64 resolves a ten-thousandth of the run.
+# How long before 0 s a piece of a path may begin, in lengths of the run: float64 then resolves 1e-4 of the run.
 _LONG_AGO = 1e12
 # The most cells: floats do not hold all larger whole numbers, and the numbers of images are multiplied by lengths.
 _MOST_CELLS = 2.0**53
