@@ -169,8 +169,9 @@ def test_a_step_in_a_contact_asks_for_no_safe_step(name, monkeypatch):
     # A contact of pi sqrt(m/alpha) takes 18 steps.
     result = run(WALLS[name](TURN), swarm.Penalty(H, ALPHA), 4.0)
     impacts = result.observables["impacts"][-1]
+    assert impacts >= 10
     # A flight to an edge ends in two impacts.
-    assert 10 <= len(asked) <= 3 * impacts
+    assert impacts <= 2 * len(asked) <= 6 * impacts
 
 
 # --- Against other ways to compute it --------------------------------------------------------------------
